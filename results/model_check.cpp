@@ -337,6 +337,33 @@ void judge_prior(const ModelClaims& claims, ModelCheck& result) {
   }
 }
 
+/// Driving to come is watched with no smaller errors than those that the set is proved with. The motion between samples
+/// is left out: commissioning bounds it for the log and for other driving by different means.
+void judge_detector(const ModelClaims& claims, ModelCheck& result) {
+  if (!claims.detector_errors) {
+    return;
+  }
+  const filter::SignalErrors &watched = *claims.detector_errors, &proved = claims.errors;
+  const auto judge = [&](const char* key, const auto& stated, const auto& least) {
+    for (Eigen::Index i = 0; i < least.size(); ++i) {
+      const double value = i < stated.size() ? stated[i] : 0.0;
+      if (value < least[i]) {
+        result.failures.push_back(
+            fmt::format("detector.error_bounds.{}[{}] is {}: expected at least {}, the noise that the bounds are "
+                        "proved with",
+                        key, i, value, least[i]));
+      }
+    }
+  };
+  judge("output", watched.output, proved.output);
+  judge("acceleration", watched.acceleration, proved.acceleration);
+  judge("speed", watched.speed, proved.speed);
+  judge("speed_sample", watched.speed_sample, proved.speed_sample);
+  judge("joint_sample", Eigen::VectorXd::Constant(1, watched.joint_sample),
+        Eigen::VectorXd::Constant(1, proved.joint_sample));
+  judge("heading", Eigen::VectorXd::Constant(1, watched.heading), Eigen::VectorXd::Constant(1, proved.heading));
+}
+
 void tell_premises(const ModelClaims& claims, ModelCheck& result) {
   result.premises.push_back(
       "the prior box, the filter, the measurement and the errors of the motion that the model states");
@@ -393,6 +420,7 @@ ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::Lo
   ModelCheck result;
   judge_log(claims, data, result);
   judge_prior(claims, result);
+  judge_detector(claims, result);
   const RebuiltRows rebuilt(claims, log);
   const Proof proof = prove_bounds(claims, rebuilt);
   judge_bounds(claims, proof, result);

@@ -261,10 +261,10 @@ void read_data(const JsonPlace& place, ModelClaims& claims) {
 
 ModelClaims claims_from_json(const Json& json, const std::string& file) {
   const JsonPlace root = robots::model_root(json, file);
-  if (root.has("detector")) {
-    static_cast<void>(robots::model_from_json(json, file));  // what detectors refuse is not proved
-  }
   ModelClaims claims;
+  if (root.has("detector")) {
+    claims.detector_errors = robots::model_from_json(json, file).errors;  // what detectors refuse is not proved
+  }
   claims.robot = robots::robot_from_json(root.at("robot").value(), root.at("robot").where());
   claims.model = model::make_model(claims.robot);
   claims.filter = robots::filter_at(root.at("filter"));

@@ -57,9 +57,10 @@ struct ModelClaims {
   Model model;
   Measurement measurement;
   FilterDesign filter;
-  filter::SignalErrors errors;            ///< of the rows of the log: Commissioning::row_errors
-  std::vector<core::NoiseOrigin> origin;  ///< of errors.output, one for each output
-  Box prior;                              ///< in which the set was sought
+  filter::SignalErrors errors;                          ///< of the rows of the log: Commissioning::row_errors
+  std::vector<core::NoiseOrigin> origin;                ///< of errors.output, one for each output
+  std::optional<filter::SignalErrors> detector_errors;  ///< of driving to come; none without a model
+  Box prior;                                            ///< in which the set was sought
   FeasibleSet::Status set = FeasibleSet::Status::nonempty;
   std::vector<PublishedBound> lower, upper;             ///< of each parameter
   std::vector<NamedRow> contradiction;                  ///< where the set is empty

@@ -255,6 +255,21 @@ TEST_P(TamperedModel, IsRefusedAndItIsSaidWhy) {
 INSTANTIATE_TEST_SUITE_P(Kinds, TamperedModel, ::testing::ValuesIn(tamperings()),
                          [](const auto& each) { return each.param.name; });
 
+// Narrower thresholds than the proof's noise would promise what was never proved; wider ones promise less.
+TEST_F(CheckAtRisk, ADetectorWithSmallerErrorsThanTheProofIsNotProved) {
+  const Json::json_pointer output("/detector/error_bounds/output/0");
+  for (const double share : {0.0, 0.5, 0.999, 1.0, 1.5}) {
+    Json model = made_->model;
+    model[output] = share * model.at(output).get<double>();
+    const auto named = ::testing::Contains(HasSubstr("detector.error_bounds.output[0]"));
+    if (share < 1.0) {
+      EXPECT_THAT(check(*made_, model).failures, named) << share;
+    } else {
+      EXPECT_THAT(check(*made_, model).failures, IsEmpty()) << share;
+    }
+  }
+}
+
 class WeakerModel : public TamperedModel {};
 
 // Claims that say less than the log allows are proved as well.
