@@ -25,8 +25,8 @@ struct KinematicFindings {
 /// One self-contained HTML page: what the detector says in words, its events (a click zooms all charts to one), the
 /// residual inside [l, u] with the events shaded, prediction, raw signals, data, and the same of
 /// the kinematic residual. `at_risk` is the same log under the detector at a stated risk. `isolations` belong to the
-/// first events, in their order; `incidents` join all events and stand first. It loads nothing when opened; every name is escaped, every number is finite.
-/// `context.own_log` is not used.
+/// first events, in their order; `incidents` join all events and stand first. It loads nothing when opened; every name
+/// is escaped, every number is finite. `context.own_log` is not used.
 [[nodiscard]] std::string detect_report(const Detection& detection, const OnlineModel& model,
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
                                         const std::vector<detector::Isolation>& isolations = {},
