@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/report/detect_report.hpp>
 #include <wheelwright/report/page.hpp>
@@ -99,6 +100,8 @@ int run(const Arguments& a) {
   commission::EventIsolationOptions isolation;
   isolation.isolation.threads = static_cast<std::size_t>(std::max(a.common.threads, 1));
   const std::vector<detector::Isolation> isolations = commission::isolate_events(log, model, detection, isolation);
+  const std::vector<detector::Incident> incidents =
+      commission::join_events(log, model, detection, isolations, kinematic, isolation);
   const bool fault = !detection.events.empty() || !at_risk.events.empty() ||
                      (kinematic.detection && !kinematic.detection->events.empty());
   const std::string undecided = why_not_decided(detection, model, log);
@@ -107,14 +110,15 @@ int run(const Arguments& a) {
     results::add_isolation(json, isolations);
     results::add_kinematic(json, kinematic, model);
     results::add_at_risk(json, at_risk, model);
+    results::add_incidents(json, incidents);
     if (!undecided.empty()) {
       json["undecided"] = undecided;
     }
     std::string page;
     if (!a.common.out.empty()) {
-      page =
-          report::detect_report(detection, model, context,
-                                {.detection = kinematic.detection, .message = kinematic.message}, isolations, at_risk);
+      page = report::detect_report(detection, model, context,
+                                   {.detection = kinematic.detection, .message = kinematic.message}, isolations,
+                                   at_risk, incidents);
     }
     publish(a.common, json, "detection.json", page);
   }
@@ -123,8 +127,7 @@ int run(const Arguments& a) {
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
-    say("{}{}{}{}", summary(detection, model), summary(at_risk, model), summary(isolations, detection),
-        summary(kinematic, model));
+    say("{}{}{}{}", summary(incidents), summary(detection, model), summary(at_risk, model), summary(kinematic, model));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "detection.json").string(), (a.common.out / "report.html").string());
     }

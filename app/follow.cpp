@@ -12,10 +12,12 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/commission/blind_watch.hpp>
+#include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/logs/csv.hpp>
 
 #include <wheelwright/results/detection_json.hpp>
+#include <wheelwright/words/detect_words.hpp>
 #include <wheelwright/words/summary.hpp>
 
 namespace wheelwright::app {
@@ -53,7 +55,8 @@ class Watch {
         recorder_(model.model.n(), kMerge) {}
 
   /// Takes a row, tells an event that begins with it; whether there was a decision.
-  bool take(const LogBlock& row, std::size_t number, std::ostream& out, bool json) {
+  bool take(const LogBlock& row, std::size_t number, std::ostream& out, bool json, commission::IncidentWatch& incidents,
+            bool torque) {
     if (!row.segment_starts.empty()) {
       detector_.restart();
     }
@@ -67,6 +70,9 @@ class Watch {
       if (recorder_.add(i, number, row.t[0], c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm)) {
         const detector::Event& event = recorder_.events().back();
         out << (json ? files::json_text(results::to_json(event, model_), -1) : event_line(event, model_)) << std::endl;
+        incidents.event(event, torque);
+      } else if (c.alarm) {
+        incidents.lasts(row.t[0]);
       }
     }
     return decision.valid;
@@ -186,6 +192,22 @@ ExitCode follow(files::LineReader in, std::ostream& out, TorqueDetector detector
                  : "at a stated risk, " + commission::sentence(event, model.model))
         << std::endl;
   };
+  commission::IncidentWatch incidents(model);
+  const auto tell_incident = [&](const char* change, const detector::Incident& incident) {
+    Json said = results::to_json(incident);
+    said["change"] = change;
+    out << (json ? files::json_text({{"incident", said}}, -1)
+                 : fmt::format("incident {}: {}", change, incident_sentence(incident)))
+        << std::endl;
+  };
+  const auto settle = [&](bool all) {
+    for (const commission::IncidentWatch::Told& told : incidents.settle(all)) {
+      if (told.closed) {
+        tell_incident("closed", *told.closed);
+      }
+      tell_incident(told.change == detector::IncidentRecorder::Change::opened ? "opened" : "narrowed", told.incident);
+    }
+  };
   Blindness blindness(model, parser, out, json);
   LogBlock row;
   std::size_t number = 0;
@@ -204,7 +226,11 @@ ExitCode follow(files::LineReader in, std::ostream& out, TorqueDetector detector
       blindness.unreadable(error.what());
       continue;
     }
-    if (torque.take(row, number, out, json)) {
+    for (std::size_t c = 0; c < sample.size(); ++c) {
+      sample[c] = row.columns[(*pick)[c]][0];
+    }
+    incidents.row(row.t[0], sample, !row.segment_starts.empty());
+    if (torque.take(row, number, out, json, incidents, true)) {
       blindness.decided(row.t[0]);
     } else {
       blindness.undecided(row.t[0]);
@@ -213,7 +239,7 @@ ExitCode follow(files::LineReader in, std::ostream& out, TorqueDetector detector
       times.push_back(row.t[0]);
     }
     if (kinematic) {
-      kinematic->take(row, number, out, json);
+      kinematic->take(row, number, out, json, incidents, false);
     }
     const auto sum = [&](auto& sums, const auto& columns, std::vector<double>& values, auto& recorder) {
       if (!row.segment_starts.empty()) {
@@ -233,7 +259,12 @@ ExitCode follow(files::LineReader in, std::ostream& out, TorqueDetector detector
     if (pose_sums) {
       sum(*pose_sums, pose_pick, pose_sample, pose_at_risk);
     }
+    settle(false);
     ++number;
+  }
+  settle(true);
+  if (incidents.open()) {
+    tell_incident("closed", *incidents.open());
   }
   if (torque.any() || (kinematic && kinematic->any()) || !at_risk.watch().events.empty() ||
       !pose_at_risk.watch().events.empty()) {

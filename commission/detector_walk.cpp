@@ -229,13 +229,15 @@ std::string names(const detector::Isolation& isolation, Verdict verdict) {
 
 }  // namespace
 
+double isolation_memory(const OnlineModel& model) { return (kMemory + model.filter.settle) / model.filter.beta; }
+
 std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model, const Detection& detection,
                                                 const EventIsolationOptions& options) {
   const RegressorFilter filter(model.model, model.filter, model.measurement, model.errors);
   std::vector<Piece> pieces;
   for (std::size_t k = 0; k < std::min(detection.events.size(), options.most_events); ++k) {
     const detector::Event& event = detection.events[k];
-    const double memory = (kMemory + model.filter.settle) / model.filter.beta;
+    const double memory = isolation_memory(model);
     pieces.push_back({.row = event.start_sample,
                       .from = event.start - options.isolation.before - memory,
                       .to = event.alarm + options.isolation.after});

@@ -117,6 +117,9 @@ struct EventIsolationOptions {
   std::size_t most_events = 8;           ///< the first ones; the others are left alone
 };
 
+/// How long before the window of an isolation rows have to begin, s.
+[[nodiscard]] double isolation_memory(const OnlineModel& model);
+
 /// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against
 /// the catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
 /// Where the model says something at a stated risk, sums over all scales are asked, too (narrow_by_sums()): the log is

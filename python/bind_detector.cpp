@@ -146,6 +146,7 @@ struct DetectionObject {
   commission::KinematicWatch kinematic;
   std::vector<detector::Isolation> isolations;
   commission::RiskWatch at_risk;
+  std::vector<detector::Incident> incidents;
 
   [[nodiscard]] bool fault() const {
     return !detection.events.empty() || !at_risk.events.empty() ||
@@ -156,11 +157,12 @@ struct DetectionObject {
     results::add_isolation(json, isolations);
     results::add_kinematic(json, kinematic, *model.model);
     results::add_at_risk(json, at_risk, *model.model);
+    results::add_incidents(json, incidents);
     return json;
   }
   [[nodiscard]] std::string summary() const {
-    return words::summary(detection, *model.model) + words::summary(at_risk, *model.model) +
-           words::summary(isolations, detection) + words::summary(kinematic, *model.model);
+    return words::summary(incidents) + words::summary(detection, *model.model) + words::summary(at_risk, *model.model) +
+           words::summary(kinematic, *model.model);
   }
 };
 
@@ -179,7 +181,7 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
     const LogWalk walk(log);
     logs::require_columns(*log.source, model->measurement.columns());
     WatchedLog source(*log.source, work);
-    DetectionObject out{{model, given.path}, log.name(), {}, {}, {}, {}};
+    DetectionObject out{{model, given.path}, log.name(), {}, {}, {}, {}, {}};
     const auto tell = work.teller();
     tell("the torque residual", 0.0);
     out.detection = detect(source, make_detector(*model, own));
@@ -191,6 +193,7 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
     commission::EventIsolationOptions isolation;
     isolation.isolation.threads = threads;
     out.isolations = commission::isolate_events(source, *model, out.detection, isolation);
+    out.incidents = commission::join_events(source, *model, out.detection, out.isolations, out.kinematic, isolation);
     tell("done", 1.0);
     return out;
   });
@@ -321,6 +324,16 @@ void bind_detector(py::module_& m) {
                                          : std::vector<EventObject>{};
           },
           "of wheel odometry against pose or gyro")
+      .def_property_readonly(
+          "incidents",
+          [](const DetectionObject& d) {
+            py::list list;
+            for (const detector::Incident& incident : d.incidents) {
+              list.append(to_python(results::to_json(incident)));
+            }
+            return list;
+          },
+          "events that one fault explains, as in detection.json")
       .def_property_readonly("summary", &DetectionObject::summary)
       .def(
           "to_dict", [](const DetectionObject& d) { return to_python(d.json()); },

@@ -157,7 +157,7 @@ std::string at_risk_section(const commission::RiskWatch& watch, const OnlineMode
 
 std::string detect_report(const Detection& detection, const OnlineModel& model, const ReportContext& context,
                           const KinematicFindings& kinematic, const std::vector<detector::Isolation>& isolations,
-                          const commission::RiskWatch& at_risk) {
+                          const commission::RiskWatch& at_risk, const std::vector<detector::Incident>& incidents) {
   const TimeAxis axis = axis_for(detection, context);
   std::vector<std::vector<ChartMark>> marks(detection.trace.outputs.size());
   std::vector<ChartMark> all_marks;
@@ -177,6 +177,9 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   content.status = fault ? "bad" : detection.instants == 0 ? "caution" : "good";
   content.verdict = detect_verdict(detection, kinematic_events + at_risk.events.size());
   content.sentences = detect_words(detection, model, isolations, axis);
+  for (std::size_t k = incidents.size(); k-- > 0;) {
+    content.sentences.insert(content.sentences.begin(), core::capital(incident_sentence(incidents[k])));
+  }
   if (!at_risk.events.empty()) {
     content.sentences.insert(content.sentences.begin(),
                              core::capital(commission::sentence(at_risk.events.front(), model.model)) + ".");

@@ -9,6 +9,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/report/page.hpp>
@@ -24,12 +25,13 @@ struct KinematicFindings {
 /// One self-contained HTML page: what the detector says in words, its events (a click zooms all charts to one), the
 /// residual inside [l, u] with the events shaded, prediction, raw signals, data, and the same of
 /// the kinematic residual. `at_risk` is the same log under the detector at a stated risk. `isolations` belong to the
-/// first events, in their order. It loads nothing when opened; every name is escaped, every number is finite.
-/// `context.own_log` is not used.
+/// first events, in their order; `incidents` join all events and stand first. It loads nothing when opened; every name
+/// is escaped, every number is finite. `context.own_log` is not used.
 [[nodiscard]] std::string detect_report(const Detection& detection, const OnlineModel& model,
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
                                         const std::vector<detector::Isolation>& isolations = {},
-                                        const commission::RiskWatch& at_risk = {});
+                                        const commission::RiskWatch& at_risk = {},
+                                        const std::vector<detector::Incident>& incidents = {});
 
 /// Smallest certain size over the delay, both logarithmic: for each manoeuvre the median over its onsets, and the size
 /// that is certain at every one of them (thin). Empty where nothing is certain.

@@ -51,6 +51,54 @@ Json to_json(const Detection& d, const OnlineModel& model, const std::string& mo
   return json;
 }
 
+namespace {
+
+Json finding_json(const detector::FaultFinding& f) {
+  Json entry = {{"fault", f.fault.name}, {"magnitude", nullptr}, {"onset", {f.onset.lower, f.onset.upper}},
+                {"unit", f.fault.unit},  {"earlier", f.earlier}, {"complete", f.complete}};
+  if (f.magnitude) {
+    entry["magnitude"] = {f.magnitude->lower, f.magnitude->upper};
+  }
+  if (f.at_risk) {
+    Json& at_risk = entry["at_risk"];
+    at_risk = {{"excluded", f.at_risk->excluded}, {"magnitude", nullptr}, {"onset", nullptr}};
+    if (f.at_risk->magnitude) {
+      at_risk["magnitude"] = {f.at_risk->magnitude->lower, f.at_risk->magnitude->upper};
+    }
+    if (!f.at_risk->excluded) {
+      at_risk["onset"] = {f.at_risk->onset.lower, f.at_risk->onset.upper};
+    }
+  }
+  return entry;
+}
+
+}  // namespace
+
+Json to_json(const detector::Incident& incident) {
+  Json candidates = Json::array();
+  for (const detector::IncidentCandidate& candidate : incident.candidates) {
+    Json entry = finding_json(candidate.finding);
+    entry["changes"] = candidate.changes;
+    entry["sentence"] = commission::sentence(candidate.finding);
+    candidates.push_back(std::move(entry));
+  }
+  return {{"start", incident.start},
+          {"alarm", incident.alarm},
+          {"end", incident.end},
+          {"events", incident.events},
+          {"examined", incident.examined},
+          {"unexplained", incident.unexplained},
+          {"candidates", std::move(candidates)},
+          {"sentence", words::incident_sentence(incident)}};
+}
+
+void add_incidents(Json& json, const std::vector<detector::Incident>& incidents) {
+  Json& list = json["incidents"] = Json::array();
+  for (const detector::Incident& incident : incidents) {
+    list.push_back(to_json(incident));
+  }
+}
+
 void add_isolation(Json& json, const std::vector<detector::Isolation>& isolations) {
   using Verdict = detector::FaultFinding::Verdict;
   for (std::size_t k = 0; k < isolations.size(); ++k) {
@@ -61,22 +109,7 @@ void add_isolation(Json& json, const std::vector<detector::Isolation>& isolation
       } else if (f.verdict == Verdict::not_examined) {
         open.push_back(f.fault.name);
       } else {
-        Json entry = {{"fault", f.fault.name}, {"magnitude", nullptr}, {"onset", {f.onset.lower, f.onset.upper}},
-                      {"unit", f.fault.unit},  {"earlier", f.earlier}, {"complete", f.complete}};
-        if (f.magnitude) {
-          entry["magnitude"] = {f.magnitude->lower, f.magnitude->upper};
-        }
-        if (f.at_risk) {
-          Json& at_risk = entry["at_risk"];
-          at_risk = {{"excluded", f.at_risk->excluded}, {"magnitude", nullptr}, {"onset", nullptr}};
-          if (f.at_risk->magnitude) {
-            at_risk["magnitude"] = {f.at_risk->magnitude->lower, f.at_risk->magnitude->upper};
-          }
-          if (!f.at_risk->excluded) {
-            at_risk["onset"] = {f.at_risk->onset.lower, f.at_risk->onset.upper};
-          }
-        }
-        consistent.push_back(std::move(entry));
+        consistent.push_back(finding_json(f));
       }
     }
     event["isolation"] = std::move(consistent);

@@ -11,6 +11,7 @@
 #include <wheelwright/commission/blind_watch.hpp>
 #include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/files/json.hpp>
@@ -27,6 +28,12 @@ namespace wheelwright::results {
 
 /// A spell without decisions as JSON, for the reason `why`; `until` (s) where it is over.
 [[nodiscard]] Json to_json(const commission::BlindSpell& spell, std::optional<double> until, const std::string& why);
+
+/// An incident as JSON.
+[[nodiscard]] Json to_json(const detector::Incident& incident);
+
+/// Adds the incidents, in their order, to a detection as JSON.
+void add_incidents(Json& detection, const std::vector<detector::Incident>& incidents);
 
 /// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().
 void add_isolation(Json& detection, const std::vector<detector::Isolation>& isolations);

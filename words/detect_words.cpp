@@ -112,6 +112,35 @@ std::vector<std::string> detect_words(const Detection& detection, const OnlineMo
   return out;
 }
 
+std::string incident_sentence(const detector::Incident& incident) {
+  constexpr std::size_t most = 3;  // others that are written out
+  std::vector<std::string> faults;
+  for (const detector::IncidentCandidate& candidate : incident.candidates) {
+    faults.push_back(commission::sentence(candidate.finding) +
+                     (candidate.changes ? " (the size changes: that of the last event)" : ""));
+  }
+  std::string text;
+  if (faults.empty()) {
+    text = incident.examined == 0 ? "the robot does not move as its wheels roll"
+                                  : "nothing in the catalogue that was examined explains it";
+    text += fmt::format(", since {:.2f} s", incident.start);
+  } else {
+    const std::size_t shown = std::min(faults.size(), most + 1);
+    text = faults.front();
+    if (shown > 1) {
+      text += fmt::format("; also possible: {}", fmt::join(faults.begin() + 1, faults.begin() + shown, "; "));
+    }
+    if (faults.size() > shown) {
+      text += fmt::format("; and {} more", faults.size() - shown);
+    }
+  }
+  text += fmt::format(" ({} from {:.2f} to {:.2f} s", plural(incident.events, "event"), incident.start, incident.end);
+  if (!faults.empty() && incident.unexplained > 0) {
+    text += fmt::format(", {} of them explained by no fault that was examined", incident.unexplained);
+  }
+  return text + ").";
+}
+
 namespace {
 
 // What is best known of one fault on one side in one manoeuvre, over the residuals.

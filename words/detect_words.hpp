@@ -11,6 +11,7 @@
 
 #include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/words/text.hpp>
 
@@ -25,6 +26,10 @@ namespace wheelwright::words {
 [[nodiscard]] std::vector<std::string> detect_words(const Detection& detection, const OnlineModel& model,
                                                     const std::vector<detector::Isolation>& isolations,
                                                     const TimeAxis& axis);
+
+/// An incident in one sentence: the likeliest fault with size and onset, what else is possible, how many events it
+/// joins. Text, not HTML.
+[[nodiscard]] std::string incident_sentence(const detector::Incident& incident);
 
 /// A magnitude of a fault: a share as a percentage ("4.1 %"), else with its unit; "–" where it is infinite.
 [[nodiscard]] std::string magnitude_words(const model::FaultType& fault, double magnitude);

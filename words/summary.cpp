@@ -259,10 +259,10 @@ std::string summary(const Detection& d, const OnlineModel& model) {
   return text;
 }
 
-std::string summary(const std::vector<detector::Isolation>& isolations, const Detection& detection) {
+std::string summary(const std::vector<detector::Incident>& incidents) {
   std::string text;
-  for (std::size_t k = 0; k < isolations.size(); ++k) {
-    text += fmt::format("alarm at {:.3f} s: {}\n", detection.events[k].alarm, commission::sentence(isolations[k]));
+  for (std::size_t k = 0; k < incidents.size(); ++k) {
+    text += fmt::format("incident {}: {}\n", k + 1, incident_sentence(incidents[k]));
   }
   return text;
 }

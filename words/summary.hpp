@@ -10,6 +10,7 @@
 #include <wheelwright/commission/blind_watch.hpp>
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
@@ -33,8 +34,8 @@ namespace wheelwright::words {
 /// Summary of the detector at a stated risk for a terminal; empty where the model says nothing at a risk.
 [[nodiscard]] std::string summary(const commission::RiskWatch& watch, const OnlineModel& model);
 
-/// Summary of the isolation of the first events for a terminal.
-[[nodiscard]] std::string summary(const std::vector<detector::Isolation>& isolations, const Detection& detection);
+/// The incidents for a terminal, a line each; empty where there are none.
+[[nodiscard]] std::string summary(const std::vector<detector::Incident>& incidents);
 
 /// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), with what to do
 /// about it.

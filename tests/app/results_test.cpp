@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Results: the truth inside its bounds, the same digits each time, batch and stream of one mind, and files that fit
 // their schemas.
+#include <algorithm>
+
 #include "app/program.hpp"
 
 namespace wheelwright::app::results_test {
@@ -26,7 +28,7 @@ class Results : public testing::ProgramTest {
       const Json event = Json::parse(line);
       if (event.contains("at_risk")) {
         at_risk.push_back(event.at("at_risk"));
-      } else {
+      } else if (!event.contains("incident")) {
         events.push_back(event);
       }
     }
@@ -109,6 +111,39 @@ TEST_F(Results, FollowTellsWhatBatchTells) {
     EXPECT_EQ(alarms_of(events), alarms_of(Json::parse(batch.out).at("events"))) << options;
     EXPECT_EQ(at_risk, sums_of(Json::parse(batch.out).at("at_risk").at("events"))) << options;
   }
+}
+
+TEST_F(Results, OneFaultIsOneIncidentAndOneSentence) {
+  commission_shipped();
+  simulate("fault.yaml", "fault.csv");
+  const Outcome batch = run("detect fault.csv --model model/model.json --json --out found");
+  const Json result = Json::parse(batch.out);
+  if (has_validator()) {
+    EXPECT_EQ(misfit("detection.schema.json", "found/detection.json"), "");
+  }
+  EXPECT_GT(result.at("events").size(), 8u);
+  ASSERT_EQ(result.at("incidents").size(), 1u);
+  const Json& incident = result.at("incidents").at(0);
+  EXPECT_EQ(incident.at("events"), result.at("events").size());
+  // The left tyre loses 2 cm of 9.75 cm between 30 and 32 s.
+  const Json& likeliest = incident.at("candidates").at(0);
+  EXPECT_EQ(likeliest.at("fault"), "wheel_radius_left");
+  EXPECT_LE(likeliest.at("magnitude").at(0), -0.205);
+  EXPECT_GE(likeliest.at("magnitude").at(1), -0.206);
+  EXPECT_TRUE(incident.at("sentence").get<std::string>().starts_with("the left wheel's radius changes by -"))
+      << incident.at("sentence");
+  std::vector<std::string> changes;
+  for (const std::string& line :
+       testing::lines_of(run("detect --follow --model model/model.json --json", path("fault.csv")).out)) {
+    const Json told = Json::parse(line);
+    if (told.contains("incident")) {
+      changes.push_back(told.at("incident").at("change"));
+    }
+  }
+  ASSERT_FALSE(changes.empty());
+  EXPECT_EQ(changes.front(), "opened");
+  EXPECT_EQ(changes.back(), "closed");
+  EXPECT_EQ(std::count(changes.begin(), changes.end(), "opened"), 1);
 }
 
 TEST_F(Results, FollowTellsWhatBatchTellsOfADamagedLog) {

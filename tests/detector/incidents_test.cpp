@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Events that one fault explains are one incident, and the faults left are those of all its events.
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <wheelwright/detector/incidents.hpp>
+
+namespace wheelwright::detector::incidents_test {
+namespace {
+
+using Change = IncidentRecorder::Change;
+using Verdict = FaultFinding::Verdict;
+
+Event event_at(double t) { return {.start = t, .alarm = t, .end = t + 1.0}; }
+
+FaultFinding may_be(const std::string& name, Interval size, Interval onset, bool earlier = false) {
+  FaultFinding finding;
+  finding.fault.name = name;
+  finding.verdict = Verdict::consistent;
+  finding.magnitude = size;
+  finding.onset = onset;
+  finding.earlier = earlier;
+  return finding;
+}
+
+Isolation of(std::vector<FaultFinding> findings) { return {.window = {}, .findings = std::move(findings)}; }
+
+TEST(Incidents, AreNarrowedByEveryEvent) {
+  IncidentRecorder recorder;
+  const Isolation first =
+      of({may_be("slip", {0.1, 0.4}, {9.0, 10.0}), may_be("radius", {-0.25, -0.05}, {9.5, 10.0}, true),
+          may_be("dropout", {0.0, 1.0}, {9.9, 10.0})});
+  EXPECT_EQ(recorder.add(event_at(10.0), &first).change, Change::opened);
+  // A jam that began no earlier than 19.9 s is not that of 10 s.
+  const Isolation second =
+      of({may_be("radius", {-0.2, -0.15}, {17.0, 17.0}, true), may_be("slip", {0.2, 0.5}, {17.0, 18.0}, true),
+          may_be("dropout", {0.0, 1.0}, {19.9, 20.0})});
+  EXPECT_EQ(recorder.add(event_at(20.0), &second).change, Change::narrowed);
+  const Incident& incident = *recorder.open();
+  ASSERT_EQ(incident.candidates.size(), 2u);
+  EXPECT_EQ(incident.events, 2u);
+  EXPECT_EQ(incident.start, 10.0);
+  EXPECT_EQ(incident.end, 21.0);
+  // Two sizes that both events allow, in the order of their widths; onsets stay those of the first event.
+  EXPECT_EQ(incident.candidates[0].finding.fault.name, "radius");
+  EXPECT_EQ(incident.candidates[0].finding.magnitude->lower, -0.2);
+  EXPECT_EQ(incident.candidates[0].finding.magnitude->upper, -0.15);
+  EXPECT_EQ(incident.candidates[0].finding.onset.lower, 9.5);
+  EXPECT_TRUE(incident.candidates[0].finding.earlier);
+  EXPECT_EQ(incident.candidates[1].finding.magnitude->lower, 0.2);
+  EXPECT_EQ(incident.candidates[1].finding.magnitude->upper, 0.4);
+}
+
+TEST(Incidents, AFaultThatGrowsIsOneIncidentAndSaysSo) {
+  IncidentRecorder recorder;
+  const Isolation small = of({may_be("radius", {-0.1, -0.05}, {9.5, 10.0}), may_be("steady", {0.1, 0.2}, {9.5, 10.0})});
+  const Isolation large =
+      of({may_be("radius", {-0.3, -0.2}, {17.0, 17.0}, true), may_be("steady", {0.1, 0.3}, {17.0, 17.0}, true)});
+  recorder.add(event_at(10.0), &small);
+  recorder.add(event_at(20.0), &large);
+  ASSERT_EQ(recorder.open()->candidates.size(), 2u);
+  EXPECT_EQ(recorder.open()->candidates[0].finding.fault.name, "steady");
+  EXPECT_TRUE(recorder.open()->candidates[1].changes);
+  EXPECT_EQ(recorder.open()->candidates[1].finding.magnitude->upper, -0.2);
+}
+
+TEST(Incidents, WhatNoFaultOfTheFirstExplainsIsAnother) {
+  IncidentRecorder recorder;
+  const Isolation left = of({may_be("left", {0.1, 0.2}, {9.5, 10.0})}), nothing = of({});
+  const Isolation right = of({may_be("right", {0.1, 0.2}, {39.5, 40.0})});
+  recorder.add(event_at(10.0), &left);
+  EXPECT_FALSE(recorder.add(event_at(12.0), &nothing).closed) << "unexplained, but soon";
+  EXPECT_EQ(recorder.open()->unexplained, 1u);
+  EXPECT_EQ(recorder.open()->candidates.size(), 1u);
+  const auto outcome = recorder.add(event_at(40.0), &right);
+  EXPECT_EQ(outcome.change, Change::opened);
+  ASSERT_TRUE(outcome.closed);
+  EXPECT_EQ(outcome.closed->events, 2u);
+  EXPECT_TRUE(recorder.add(event_at(60.0), &nothing).closed) << "unexplained, and late";
+  // A first event that nothing explains takes its faults from one that comes soon.
+  const Isolation late = of({may_be("left", {0.1, 0.2}, {61.5, 62.0})});
+  EXPECT_EQ(recorder.add(event_at(62.0), &late).change, Change::narrowed);
+  EXPECT_EQ(recorder.open()->candidates.size(), 1u);
+}
+
+TEST(Incidents, OfALongOneFewEventsAreExamined) {
+  IncidentRecorder recorder;
+  const Isolation first = of({may_be("left", {0.1, 0.2}, {0.5, 1.0})});
+  const Isolation later = of({may_be("left", {0.1, 0.2}, {0.0, 0.0}, true)});
+  std::size_t asked = 0;
+  for (int k = 1; k <= 10000; ++k) {
+    const Event event = event_at(k);
+    const bool asks = recorder.asks(event);
+    asked += asks ? 1 : 0;
+    recorder.add(event, !asks ? nullptr : k == 1 ? &first : &later, asks);
+  }
+  EXPECT_EQ(recorder.open()->events, 10000u);
+  EXPECT_LT(asked, 50u);
+  EXPECT_EQ(recorder.open()->examined, asked);
+}
+
+}  // namespace
+}  // namespace wheelwright::detector::incidents_test
