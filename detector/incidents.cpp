@@ -54,7 +54,9 @@ std::optional<IncidentCandidate> both(IncidentCandidate now, const FaultFinding&
     narrow_size(finding.magnitude, later.magnitude, now.changes);
     finding.complete = finding.complete || later.complete;
   }
-  if (finding.at_risk && later.at_risk) {
+  if (!finding.at_risk) {
+    finding.at_risk = later.at_risk;
+  } else if (later.at_risk) {
     finding.at_risk->excluded = finding.at_risk->excluded || later.at_risk->excluded;
     bool differ = now.changes;
     narrow_size(finding.at_risk->magnitude, later.at_risk->magnitude, differ);
