@@ -126,9 +126,16 @@ std::string incident_sentence(const detector::Incident& incident) {
     text += fmt::format(", since {:.2f} s", incident.start);
   } else {
     const std::size_t shown = std::min(faults.size(), most + 1);
-    text = faults.front();
+    const bool none_at_risk = std::ranges::all_of(incident.candidates, [](const detector::IncidentCandidate& c) {
+      return c.finding.at_risk && c.finding.at_risk->excluded;
+    });
+    text = (none_at_risk ? "at the stated risk no fault that was examined, each as one that stays; for certain not "
+                           "excluded: "
+                         : "") +
+           faults.front();
     if (shown > 1) {
-      text += fmt::format("; also possible: {}", fmt::join(faults.begin() + 1, faults.begin() + shown, "; "));
+      text += fmt::format("; {}{}", none_at_risk ? "" : "also possible: ",
+                          fmt::join(faults.begin() + 1, faults.begin() + shown, "; "));
     }
     if (faults.size() > shown) {
       text += fmt::format("; and {} more", faults.size() - shown);

@@ -2,6 +2,7 @@
 /// \file
 /// Each outcome has its sentences.
 #include <wheelwright/words/commission_words.hpp>
+#include <wheelwright/words/detect_words.hpp>
 
 #include <cmath>
 #include <limits>
@@ -177,6 +178,22 @@ TEST(DetectReport, SaysWhenAndWhereTheFirstEventCame) {
   const std::string healthy = report::detect_report(example::detection(900, false), model, example::context(900));
   EXPECT_TRUE(example::holds(healthy, {"No fault was seen", "30.0 %"}));
   EXPECT_TRUE(example::lacks(healthy, {"first alarm"}));
+}
+
+// What the stated risk leaves leads; where it leaves nothing, that does, and what is not excluded for certain follows.
+TEST(IncidentSentence, BeginsWithWhatTheStatedRiskLeaves) {
+  detector::Incident incident;
+  incident.events = incident.examined = 2;
+  for (const bool excluded : {false, true}) {
+    detector::IncidentCandidate candidate;
+    candidate.finding.fault = model::fault_catalogue(example::done().model.model).front();
+    candidate.finding.verdict = detector::FaultFinding::Verdict::consistent;
+    candidate.finding.at_risk = detector::SumFinding{.excluded = excluded};
+    incident.candidates.push_back(candidate);
+  }
+  EXPECT_THAT(incident_sentence(incident), AllOf(HasSubstr("also possible"), Not(HasSubstr("not excluded: "))));
+  incident.candidates.erase(incident.candidates.begin());
+  EXPECT_THAT(incident_sentence(incident), testing::StartsWith("at the stated risk no fault that was examined"));
 }
 
 }  // namespace
