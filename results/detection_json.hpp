@@ -28,6 +28,9 @@ namespace wheelwright::results {
 /// A spell without decisions as JSON, for the reason `why`; `until` (s) where it is over.
 [[nodiscard]] Json to_json(const commission::BlindSpell& spell, std::optional<double> until, const std::string& why);
 
+/// A time in which no row of a stream came as JSON.
+[[nodiscard]] Json to_json(const commission::StreamSilence& silence);
+
 /// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().
 void add_isolation(Json& detection, const std::vector<detector::Isolation>& isolations);
 
