@@ -51,7 +51,8 @@ constexpr const char* kExamples =
     "  robot_driver | wheelwright detect --follow --model result/model.json\n\n"
     "Exit code: 0 no fault, 1 a fault was found, 2 bad input, or it could not be decided: at no instant, at fewer "
     "than\n"
-    "half of the rows, or, with --follow, at none of the last ones. --follow tells such spells as they come (blind).";
+    "half of the rows, or, with --follow, at none of the last ones. --follow tells such spells as they come (blind),\n"
+    "and when no row has come for 5 s (silent).";
 
 // Why the log as a whole is not decided; empty where it is: all but what the filter settles in, or half of it.
 std::string why_not_decided(const Detection& detection, const OnlineModel& model, const logs::RecordedLog& log) {
@@ -76,8 +77,7 @@ int run(const Arguments& a) {
   logs::LogOptions reader = reader_options(a.common);
   reader.only = robots::useful_columns(model.robot);
   if (a.follow) {
-    return follow(files::LineReader(files::open_stream(STDIN_FILENO, "standard input"), "standard input"), std::cout,
-                  std::move(detector), model, a.detector, reader, a.common.json);
+    return follow(STDIN_FILENO, std::cout, std::move(detector), model, a.detector, reader, a.common.json);
   }
   if (a.log.empty()) {
     throw InputError("detect: expected a LOG, or --follow to read rows from standard input");

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "follow.hpp"
 
+#include <poll.h>
+
 #include <algorithm>
+#include <chrono>
+#include <cstdint>
 #include <cstdio>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,6 +19,7 @@
 #include <wheelwright/commission/blind_watch.hpp>
 #include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/logs/csv.hpp>
 
 #include <wheelwright/results/detection_json.hpp>
@@ -24,7 +30,10 @@ namespace wheelwright::app {
 using namespace words;
 namespace {
 
-constexpr double kMerge = 0.5;            // s, as detect() on a whole log
+constexpr double kMerge = 0.5;        // s, as detect() on a whole log
+constexpr double kPatience = 5.0;     // s without a row that are silence
+constexpr double kFewestRows = 20.0;  // or as long as these many take, where that is longer
+constexpr const char* kName = "standard input";
 constexpr std::size_t kMostTimes = 1000;  // rows from which the step is taken
 
 // Positions of the columns `names`; nothing, and `missing` says which, where there are not all of them.
@@ -90,6 +99,69 @@ class Watch {
   std::size_t decisions_ = 0;
 };
 
+// Times in which no row comes.
+class Silence {
+ public:
+  Silence(double step, std::ostream& out, bool json)
+      : patience_(static_cast<std::int64_t>(1000.0 * std::max(kPatience, kFewestRows * step))),
+        out_(out),
+        json_(json) {}
+
+  [[nodiscard]] std::chrono::milliseconds patience() const { return patience_; }
+  /// Nothing has come for the patience.
+  void noticed() {
+    if (!std::exchange(told_, true)) {
+      tell();
+    }
+  }
+  void row(double t) {
+    if (std::exchange(told_, false)) {
+      silence_.until = t;
+      tell();
+    }
+    silence_ = {.since = t, .until = std::nullopt, .seconds = 0.0};
+    last_ = Clock::now();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void tell() {
+    silence_.seconds = std::chrono::duration<double>(Clock::now() - last_).count();
+    out_ << (json_ ? files::json_text({{"silent", results::to_json(silence_)}}, -1) : silence_line(silence_))
+         << std::endl;
+  }
+
+  std::chrono::milliseconds patience_;
+  std::ostream& out_;
+  bool json_;
+  Clock::time_point last_ = Clock::now();
+  commission::StreamSilence silence_;
+  bool told_ = false;
+};
+
+// What comes from `descriptor`; `silence` is told where nothing does.
+class Awaited final : public files::ByteSource {
+ public:
+  Awaited(int descriptor, Silence& silence)
+      : stream_(files::open_stream(descriptor, kName)), descriptor_(descriptor), silence_(silence) {}
+
+  std::size_t read(char* to, std::size_t size) override {
+    pollfd wanted{.fd = descriptor_, .events = POLLIN, .revents = 0};
+    if (::poll(&wanted, 1, static_cast<int>(silence_.patience().count())) == 0) {
+      silence_.noticed();
+    }
+    return stream_->read(to, size);
+  }
+  [[nodiscard]] std::uint64_t file_bytes() const override { return stream_->file_bytes(); }
+  [[nodiscard]] std::string hash() const override { return stream_->hash(); }
+  [[nodiscard]] const char* packing() const override { return stream_->packing(); }
+
+ private:
+  std::unique_ptr<files::ByteSource> stream_;
+  int descriptor_;
+  Silence& silence_;
+};
+
 // Spells without a decision on the torque residual, with what the parser met in them.
 class Blindness {
  public:
@@ -151,8 +223,10 @@ class Blindness {
 
 }  // namespace
 
-ExitCode follow(files::LineReader in, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
+ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
                 const detector::DetectorOptions& options, const logs::CsvOptions& reader, bool json) {
+  Silence silence(model.measurement.nominal_step, out, json);
+  files::LineReader in(std::make_unique<Awaited>(stream, silence), kName);
   std::string_view line;
   do {
     if (!in.next(line)) {
@@ -226,6 +300,7 @@ ExitCode follow(files::LineReader in, std::ostream& out, TorqueDetector detector
       blindness.unreadable(error.what());
       continue;
     }
+    silence.row(row.t[0]);
     for (std::size_t c = 0; c < sample.size(); ++c) {
       sample[c] = row.columns[(*pick)[c]][0];
     }

@@ -41,4 +41,11 @@ class BlindWatch {
   bool told_ = false;
 };
 
+/// A time in which no row of a stream came.
+struct StreamSilence {
+  std::optional<double> since;  ///< s, the last row before it; nothing where there was none
+  std::optional<double> until;  ///< s, the first row behind it; nothing while it lasts
+  double seconds = 0.0;         ///< how long it has lasted, by the machine's clock
+};
+
 }  // namespace wheelwright::commission

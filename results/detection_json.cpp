@@ -127,6 +127,11 @@ Json to_json(const commission::BlindSpell& spell, std::optional<double> until, c
           {"reason", why}};
 }
 
+Json to_json(const commission::StreamSilence& silence) {
+  return {
+      {"since", files::or_null(silence.since)}, {"until", files::or_null(silence.until)}, {"seconds", silence.seconds}};
+}
+
 Json to_json(const commission::RiskEvent& e, const OnlineModel& model) {
   return {{"alarm", e.alarm},
           {"end", e.end},

@@ -29,6 +29,9 @@ namespace wheelwright::results {
 /// A spell without decisions as JSON, for the reason `why`; `until` (s) where it is over.
 [[nodiscard]] Json to_json(const commission::BlindSpell& spell, std::optional<double> until, const std::string& why);
 
+/// A time in which no row of a stream came as JSON.
+[[nodiscard]] Json to_json(const commission::StreamSilence& silence);
+
 /// An incident as JSON.
 [[nodiscard]] Json to_json(const detector::Incident& incident);
 

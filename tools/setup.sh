@@ -19,7 +19,7 @@ packages="g++ cmake ninja-build pkg-config
   libceres-dev libnlopt-cxx-dev libnlopt-dev libtbb-dev
   libcli11-dev"
 everything="libopenmpi-dev openmpi-bin
-  libgtest-dev libgmock-dev python3-jsonschema
+  libgtest-dev libgmock-dev librapidcheck-dev python3-jsonschema
   libbenchmark-dev coinor-libclp-dev libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev
   pybind11-dev python3 python3-dev python3-numpy"
 case "${1:-}" in

@@ -134,8 +134,8 @@ std::string incident_sentence(const detector::Incident& incident) {
                          : "") +
            faults.front();
     if (shown > 1) {
-      text += fmt::format("; {}{}", none_at_risk ? "" : "also possible: ",
-                          fmt::join(faults.begin() + 1, faults.begin() + shown, "; "));
+      text += fmt::format(
+          "; {}{}", none_at_risk ? "" : "also possible: ", fmt::join(faults.begin() + 1, faults.begin() + shown, "; "));
     }
     if (faults.size() > shown) {
       text += fmt::format("; and {} more", faults.size() - shown);

@@ -233,6 +233,13 @@ std::string blind_line(const commission::BlindSpell& spell, std::optional<double
                      until ? fmt::format(" until {:.3f} s", *until) : "", spell.rows, spell.seconds, why);
 }
 
+std::string silence_line(const commission::StreamSilence& silence) {
+  return fmt::format(
+      "silent {}{}: no row for {:.1f} s by the clock of this machine, so that nothing is known of faults",
+      silence.since ? fmt::format("since t = {:.3f} s", *silence.since) : "from the start",
+      silence.until ? fmt::format(" until {:.3f} s", *silence.until) : "", silence.seconds);
+}
+
 std::string summary(const Detection& d, const OnlineModel& model) {
   std::string text;
   if (d.instants == 0) {

@@ -52,6 +52,9 @@ namespace wheelwright::words {
 [[nodiscard]] std::string blind_line(const commission::BlindSpell& spell, std::optional<double> until,
                                      const std::string& why);
 
+/// A time in which no row of a stream came in a line.
+[[nodiscard]] std::string silence_line(const commission::StreamSilence& silence);
+
 /// One event in a line.
 [[nodiscard]] std::string event_line(const detector::Event& event, const OnlineModel& model);
 

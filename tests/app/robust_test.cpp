@@ -111,6 +111,24 @@ TEST_F(Robust, AShortLossOfASensorIsNoBlindness) {
   EXPECT_THAT(text.out, IsEmpty());
 }
 
+TEST_F(Robust, AStreamOfWhichNoRowsComeSaysSoAndSaysWhenTheyComeAgain) {
+  commission_shipped();
+  put_lines("log.csv", healthy_lines());
+  // 2000 rows, then nothing while the pipe is open, then the rest, which the clock of the robot did not wait for.
+  const std::string sender = "(head -n 2001 log.csv; sleep 6; tail -n +2002 log.csv) |";
+  const Outcome json = run("detect --follow --model model/model.json --json", "/dev/stdin", sender);
+  EXPECT_EQ(json.code, 0) << json.err;
+  const std::vector<std::string> told = testing::lines_of(json.out);
+  ASSERT_EQ(told.size(), 2u) << json.out;
+  const Json noticed = Json::parse(told[0]).at("silent"), over = Json::parse(told[1]).at("silent");
+  EXPECT_NEAR(noticed.at("since").get<double>(), std::stod(healthy_lines()[2000]), 1e-9);
+  EXPECT_TRUE(noticed.at("until").is_null());
+  EXPECT_NEAR(noticed.at("seconds").get<double>(), 5.0, 0.9);
+  EXPECT_EQ(noticed.at("since"), over.at("since"));
+  EXPECT_NEAR(over.at("until").get<double>(), std::stod(healthy_lines()[2001]), 1e-9);
+  EXPECT_GE(over.at("seconds").get<double>(), 5.9);
+}
+
 TEST_F(Robust, ALogOfWhichMostCannotBeDecidedIsNotHealthy) {
   commission_shipped();
   put_changed(2000, kAll,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Each outcome has its sentences.
+#include <wheelwright/model/fault_type.hpp>
 #include <wheelwright/words/commission_words.hpp>
 #include <wheelwright/words/detect_words.hpp>
 
@@ -182,11 +183,13 @@ TEST(DetectReport, SaysWhenAndWhereTheFirstEventCame) {
 
 // What the stated risk leaves leads; where it leaves nothing, that does, and what is not excluded for certain follows.
 TEST(IncidentSentence, BeginsWithWhatTheStatedRiskLeaves) {
+  const OnlineModel model = example::done().model;
+  const model::FaultType fault = model::fault_catalogue(model.model, Eigen::VectorXd::Ones(4)).front();
   detector::Incident incident;
   incident.events = incident.examined = 2;
   for (const bool excluded : {false, true}) {
     detector::IncidentCandidate candidate;
-    candidate.finding.fault = model::fault_catalogue(example::done().model.model).front();
+    candidate.finding.fault = fault;
     candidate.finding.verdict = detector::FaultFinding::Verdict::consistent;
     candidate.finding.at_risk = detector::SumFinding{.excluded = excluded};
     incident.candidates.push_back(candidate);
