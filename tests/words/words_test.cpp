@@ -191,7 +191,7 @@ TEST(IncidentSentence, BeginsWithWhatTheStatedRiskLeaves) {
     detector::IncidentCandidate candidate;
     candidate.finding.fault = fault;
     candidate.finding.verdict = detector::FaultFinding::Verdict::consistent;
-    candidate.finding.at_risk = detector::SumFinding{.excluded = excluded};
+    candidate.finding.at_risk.emplace().excluded = excluded;
     incident.candidates.push_back(candidate);
   }
   EXPECT_THAT(incident_sentence(incident), AllOf(HasSubstr("also possible"), Not(HasSubstr("not excluded: "))));
