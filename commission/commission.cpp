@@ -140,8 +140,8 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
 }
 
 // The feasible set; where estimated bounds are too small for the prior box (θ̂ may lie outside it), they are raised.
-Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<OutputNoise>& noise, std::size_t outliers,
-                    std::vector<std::string>& notes) {
+Bounded bounded_set(LogSource& log, const Setting& s, Part part, const Fit& fit, double risk,
+                    std::vector<OutputNoise>& noise, std::size_t outliers, std::vector<std::string>& notes) {
   const auto set_with = [&](const std::vector<OutputNoise>& bounds) {
     return refined_set(log, s, part, with_noise(s, bounds, RowUse::learning), outliers);
   };
@@ -152,15 +152,21 @@ Bounded bounded_set(LogSource& log, const Setting& s, Part part, std::vector<Out
     }
     return bounded;
   };
+  TorqueRows bare = make_rows(log, s, s.declared);
+  FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
+  if (!s.noise_complete && cover_untold_outputs(noise, bare_folded, s.prior, fit.excitation)) {
+    notes.push_back(
+        "an output of the model in which nothing was excited tells no noise: its bounds are so wide that no parameter "
+        "is bounded and no fault is seen by it; excite it, or declare `noise:` in the robot file");
+  }
   Bounded first = told(set_with(noise));
   if (first.result.set.status == FeasibleSet::Status::nonempty || s.noise_complete) {
     return first;
   }
-  TorqueRows bare = make_rows(log, s, s.declared);
-  FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
-  const double factor = raise_until_explained(noise, bare_folded, s.prior, [&](const std::vector<OutputNoise>& more) {
-    return set_with(more).result.set.status == FeasibleSet::Status::nonempty;
-  });
+  const double factor = raise_until_explained(
+      noise, bare_folded, s.prior, {fit.estimate, fit.residuals, risk}, [&](const std::vector<OutputNoise>& more) {
+        return set_with(more).result.set.status == FeasibleSet::Status::nonempty;
+      });
   notes.push_back(
       fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
                   "explain the log with less",
@@ -469,7 +475,8 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 
   tell(options, "bounding", 0.4);
   result.noise = output_noise(s, fit, options.extrapolation);
-  Bounded bounded = bounded_set(log, s, Part::everything, result.noise, options.outliers, result.notes);
+  Bounded bounded = bounded_set(log, s, Part::everything, fit, options.extrapolation.risk, result.noise,
+                                options.outliers, result.notes);
   result.feasible = std::move(bounded.result.set);
   result.dropped = std::move(bounded.result.dropped);
   result.earlier = std::move(bounded.earlier);
@@ -503,9 +510,10 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 
   tell(options, "validating on held-out blocks", 0.7);
   const Fit trained = fit_log(log, s, Part::training, options.extrapolation.risk);
-  std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
   std::vector<std::string> unused;
-  const Bounded learnt = bounded_set(log, s, Part::training, noise, options.outliers, unused);
+  std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
+  const Bounded learnt =
+      bounded_set(log, s, Part::training, trained, options.extrapolation.risk, noise, options.outliers, unused);
   const FeasibleSet& set = learnt.result.set;
   if (set.status == FeasibleSet::Status::nonempty) {
     SignalErrors errors = with_noise(s, noise, RowUse::driving);

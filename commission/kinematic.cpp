@@ -229,7 +229,7 @@ FeasibleSet set_of(const Frame& s, Part part, const std::vector<OutputNoise>& no
 }
 
 // The feasible set; bounds that are too small for the prior box are raised, where all are estimated.
-BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& noise) {
+BoundedSet bounded_set(const Frame& s, Part part, const OdometryFit& fit, std::vector<OutputNoise>& noise) {
   BoundedSet result{set_of(s, part, noise)};
   const bool all_estimated = std::ranges::count(noise, core::NoiseOrigin::estimated, &OutputNoise::origin) ==
                              static_cast<std::ptrdiff_t>(noise.size());
@@ -238,9 +238,11 @@ BoundedSet bounded_set(const Frame& s, Part part, std::vector<OutputNoise>& nois
   }
   filter::OdometryRows bare = make_rows(s, {});
   FoldedSource bare_rows(bare, part, s.log_rows, s.folds);
-  result.raise = raise_until_explained(noise, bare_rows, s.prior, [&](const std::vector<OutputNoise>& more) {
-    return set_of(s, part, more).status == FeasibleSet::Status::nonempty;
-  });
+  result.raise =
+      raise_until_explained(noise, bare_rows, s.prior, {fit.squares.estimate, fit.residuals, s.extrapolation.risk},
+                            [&](const std::vector<OutputNoise>& more) {
+                              return set_of(s, part, more).status == FeasibleSet::Status::nonempty;
+                            });
   result.set = set_of(s, part, noise);
   return result;
 }
@@ -327,7 +329,7 @@ void validate_held_out(const Frame& s, KinematicCommissioning& result) {
     return;
   }
   std::vector<OutputNoise> noise = output_noise(s, *fit);
-  const FeasibleSet set = bounded_set(s, Part::training, noise).set;
+  const FeasibleSet set = bounded_set(s, Part::training, *fit, noise).set;
   if (set.status != FeasibleSet::Status::nonempty) {
     return;
   }
@@ -376,14 +378,14 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
   result.far_from_nominal = widen(s, *fit, options.radius_share);
   result.prior = s.prior;
   result.noise = output_noise(s, *fit);
-  BoundedSet bounded = bounded_set(s, Part::everything, result.noise);
+  BoundedSet bounded = bounded_set(s, Part::everything, *fit, result.noise);
   const bool any_declared = std::ranges::find(s.is_declared, true) != s.is_declared.end();
   if (bounded.set.status == FeasibleSet::Status::empty && any_declared) {
     result.declared_too_small = true;
     s.declared = {};
     s.is_declared.assign(s.is_declared.size(), false);
     result.noise = output_noise(s, *fit);
-    bounded = bounded_set(s, Part::everything, result.noise);
+    bounded = bounded_set(s, Part::everything, *fit, result.noise);
   }
   result.raise = bounded.raise;
   result.rows = bounded.set.rows;

@@ -17,7 +17,77 @@ OutputNoise estimated_noise(const identify::OutputResidual& residual, std::size_
   return noise;
 }
 
+bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
+                          const std::vector<identify::ExcitationFinding>& excitation) {
+  const auto n = static_cast<Eigen::Index>(noise.size()), p = static_cast<Eigen::Index>(prior.dimension());
+  Eigen::VectorXd most(p), largest = Eigen::VectorXd::Zero(n);
+  std::vector<bool> told(noise.size(), false), moves(noise.size(), false);
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Interval& side = prior.sides[static_cast<std::size_t>(j)];
+    most[j] = std::max(std::abs(side.lower), std::abs(side.upper));
+  }
+  core::RegressionBlock block;
+  rows.rewind();
+  while (rows.next(block)) {
+    for (Eigen::Index r = 0; r < block.rows(); ++r) {
+      const auto i = static_cast<std::size_t>(r % n);
+      largest[r % n] = std::max(largest[r % n], std::abs(block.y[r]) + block.Y.row(r).cwiseAbs().dot(most));
+      for (Eigen::Index j = 0; j < p; ++j) {
+        if (block.Y(r, j) != 0.0) {
+          moves[i] = true;
+          told[i] = told[i] || excitation[static_cast<std::size_t>(j)].state != identify::Excitation::not_excited;
+        }
+      }
+    }
+  }
+  bool any = false;
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    if (moves[i] && !told[i]) {
+      any = true;
+      noise[i].learning = std::max(noise[i].learning, (1.0 + 1e-9) * largest[static_cast<Eigen::Index>(i)]);
+      noise[i].bound = std::max(noise[i].bound, noise[i].learning);
+    }
+  }
+  return any;
+}
+
+namespace {
+
+// The point of `prior` nearest to an estimate, in its own covariance; sides that were met once are kept.
+Eigen::VectorXd inside(const Box& prior, Eigen::VectorXd theta, Eigen::MatrixXd covariance) {
+  for (Eigen::Index step = 0; step < theta.size(); ++step) {
+    Eigen::Index worst = -1;
+    double most = 0.0, by = 0.0;
+    for (Eigen::Index j = 0; j < theta.size(); ++j) {
+      const Interval& side = prior.sides[static_cast<std::size_t>(j)];
+      const double back = std::clamp(theta[j], side.lower, side.upper) - theta[j];
+      const double far = covariance(j, j) > 0.0 ? std::abs(back) / std::sqrt(covariance(j, j)) : core::kInfinity;
+      if (back != 0.0 && far > most) {
+        worst = j, most = far, by = back;
+      }
+    }
+    if (worst < 0) {
+      break;
+    }
+    if (covariance(worst, worst) > 0.0) {
+      const Eigen::VectorXd gain = covariance.col(worst) / covariance(worst, worst);
+      theta += by * gain;
+      covariance -= gain * covariance.row(worst).eval();
+    }
+    covariance.row(worst).setZero();
+    covariance.col(worst).setZero();
+  }
+  for (Eigen::Index j = 0; j < theta.size(); ++j) {
+    const Interval& side = prior.sides[static_cast<std::size_t>(j)];
+    theta[j] = std::clamp(theta[j], side.lower, side.upper);
+  }
+  return theta;
+}
+
+}  // namespace
+
 double raise_until_explained(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
+                             const EstimateInPrior& fit,
                              const std::function<bool(const std::vector<OutputNoise>&)>& explained) {
   bounds::MinimaxOptions options;
   for (const OutputNoise& o : noise) {
@@ -30,9 +100,11 @@ double raise_until_explained(std::vector<OutputNoise>& noise, core::RegressionSo
     }
     return explained(more);
   });
-  for (OutputNoise& o : noise) {
-    o.learning *= factor;
-    o.bound = std::max(o.bound, o.learning);
+  const Eigen::VectorXd plausible = identify::largest_plausible_error(
+      rows, inside(prior, fit.estimate, fit.residuals.covariance), fit.residuals, fit.risk);
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    noise[i].learning = std::max(noise[i].learning * factor, plausible[static_cast<Eigen::Index>(i)]);
+    noise[i].bound = std::max(noise[i].bound, noise[i].learning);
   }
   return factor;
 }

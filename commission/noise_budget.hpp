@@ -41,10 +41,26 @@ enum class RowUse { learning, driving };
 [[nodiscard]] OutputNoise estimated_noise(const identify::OutputResidual& residual, std::size_t instants,
                                           double plausible, const identify::ExtrapolationOptions& options);
 
+/// An output in which only parameters move that the log does not excite tells no noise: what it leaves with these
+/// parameters held at 0 lacks the noise of their columns times their true values. Its estimated bounds become what all
+/// of `prior` explains, so that no bound on a parameter and no fault is made of it. Returns whether there is one.
+bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
+                          const std::vector<identify::ExcitationFinding>& excitation);
+
+/// What bounds were estimated from: θ̂, its residuals, and the risk of the plausible error.
+struct EstimateInPrior {
+  const Eigen::VectorXd& estimate;
+  const identify::ResidualSummary& residuals;
+  double risk = 1e-3;
+};
+
 /// Raises estimated bounds that leave no set in `prior`, to just above the minimax fit of `rows` (which have none of
 /// them), and returns the factor. Where that fit did not converge the factor is bisected between what it proved, by
-/// `explained`: whether bounds leave a set.
+/// `explained`: whether bounds leave a set. With so little noise the set is next to a point, and nothing says that the
+/// true parameters are that point: bounds are raised further, to the largest plausible error
+/// (identify::largest_plausible_error) about the point of `prior` that is nearest to θ̂.
 double raise_until_explained(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
+                             const EstimateInPrior& fit,
                              const std::function<bool(const std::vector<OutputNoise>&)>& explained);
 
 /// The factor by which estimated bounds must grow for a set to be left, and a little more. `fit`, in units of the

@@ -43,7 +43,8 @@ std::vector<double> logarithmic_ticks(double low, double high, bool fine) {
   if (!(low > 0.0) || !std::isfinite(high)) {
     return out;
   }
-  for (double power = std::pow(10.0, std::floor(std::log10(low))); power <= high; power *= 10.0) {
+  const double least = std::max(low, std::numeric_limits<double>::min());
+  for (double power = std::pow(10.0, std::floor(std::log10(least))); power <= high; power *= 10.0) {
     for (const double m : {1.0, 2.0, 5.0}) {
       if ((fine || m == 1.0) && m * power >= low * (1.0 - 1e-9) && m * power <= high * (1.0 + 1e-9)) {
         out.push_back(m * power);

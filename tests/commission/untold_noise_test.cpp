@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bounds on noise that is estimated, from logs that do not show everything: the true parameters stay inside.
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <wheelwright/commission/commission.hpp>
+
+#include "support/random.hpp"
+
+namespace wheelwright::commission {
+namespace {
+
+enum class Way { straight, circle, standstill };
+
+// Two wheels under torques that are held over a step, solved in closed form.
+struct World {
+  double mass, inertia, friction, yaw_friction, radius, track;
+  double counts;  // a turn
+  double noise;   // of torques, N·m
+  Way way;
+};
+
+LogTable drive(const World& w, std::uint64_t seed) {
+  testing_support::Random random(seed);
+  LogTable log;
+  log.names = {"phi_r", "phi_l", "tau_r", "tau_l"};
+  log.columns.resize(4);
+  constexpr double h = 0.01;
+  const double count = 2.0 * std::numbers::pi / w.counts;
+  std::array<double, 2> angle{count * random.unit(), count * random.unit()};  // edges of counts at different angles
+  double v = 0.0, turning = 0.0, force = 0.0, last = 0.0;
+  for (int k = 0; k < 4000; ++k) {
+    const bool drives = w.way != Way::standstill || (k > 1000 && k < 1400);
+    if (k % 50 == 0) {
+      force = drives ? w.mass * (random.symmetric() + 0.2) : 0.0;
+      last = drives ? w.inertia * 3.0 * random.symmetric() : 0.0;
+    }
+    // On a circle of 1 m both speeds stay equal.
+    const double circle = w.inertia * (force - w.friction * v) / w.mass + w.yaw_friction * v;
+    const double moment = w.way == Way::straight ? 0.0 : w.way == Way::circle ? circle : last;
+    log.t.push_back(k * h);
+    for (std::size_t side = 0; side < 2; ++side) {
+      const double sign = side == 0 ? 1.0 : -1.0;
+      log.columns[side].push_back(std::round(angle[side] / count) * count);
+      log.columns[2 + side].push_back(0.5 * w.radius * (force + sign * 2.0 * moment / w.track) +
+                                      w.noise * random.symmetric());
+    }
+    // x' = (u − c x)/m over h: the new speed, and the way.
+    const auto step = [&](double& speed, double m, double c, double u) {
+      const double rate = c / m, end = u / c, decay = std::exp(-rate * h), before = speed;
+      speed = end + (before - end) * decay;
+      return end * h + (before - end) * (1.0 - decay) / rate;
+    };
+    const double way = step(v, w.mass, w.friction, force), turn = step(turning, w.inertia, w.yaw_friction, moment);
+    angle[0] += (way + 0.5 * w.track * turn) / w.radius;
+    angle[1] += (way - 0.5 * w.track * turn) / w.radius;
+  }
+  return log;
+}
+
+Robot robot_of(const World& w) {
+  Robot robot;
+  robot.wheel_radius = w.radius;
+  robot.track_width = w.track;
+  robot.hold = Hold::zero_order;
+  robot.effort_changes = model::EffortChanges::at_samples;
+  robot.parameters = {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
+  robot.encoder_counts_per_turn = w.counts;
+  return robot;
+}
+
+constexpr std::array kRobots{World{21.0, 0.9, 4.0, 0.5, 0.0975, 0.381, 4096.0, 0.0, Way::straight},
+                             World{3.0, 0.02, 1.0, 0.01, 0.033, 0.16, 4096.0, 0.0, Way::straight},
+                             World{250.0, 30.0, 60.0, 25.0, 0.15, 0.7, 20000.0, 0.0, Way::straight}};
+
+TEST(UntoldNoise, WhatADriveDoesNotShowIsNotKnownFromIt) {
+  CommissionOptions options;
+  options.at_risk = CommissionOptions::AtRisk::nothing;
+  for (const World& robot : kRobots) {
+    for (const Way way : {Way::straight, Way::circle, Way::standstill}) {
+      for (const double noise : {0.0, 0.01 * robot.mass * robot.radius}) {
+        for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+          World w = robot;
+          w.way = way;
+          w.noise = noise;
+          const LogTable table = drive(w, seed);
+          TableSource log(table);
+          const Commissioning c = commission_robot(log, robot_of(w), options);
+          const std::string what =
+              fmt::format("mass {} way {} noise {} seed {}: {}", w.mass, static_cast<int>(way), noise, seed, c.message);
+          const std::array truth{w.mass, w.inertia, w.friction, w.yaw_friction};
+          for (std::size_t j = 0; j < 4; ++j) {
+            const double scale = 1.0 / w.radius;  // torques at the wheels
+            EXPECT_LE(scale * c.parameters[j].lower, truth[j]) << what << ", parameter " << j;
+            EXPECT_GE(scale * c.parameters[j].upper, truth[j]) << what << ", parameter " << j;
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace wheelwright::commission
