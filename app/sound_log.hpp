@@ -36,10 +36,11 @@ struct SoundLog {
   std::vector<std::string> remarks;  ///< what was hidden and why, and what was passed over; one sentence each
 };
 
-/// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first kExaminedRows: where
-/// units, signs or sides cannot be right, InputError names the findings, and what to do. CommonOptions::despite passes
-/// over findings by their names. Other fatal findings (nothing excited, a dead signal, efforts late) are left to the
-/// commands, which have an answer of their own to each. A log that lacks columns is not examined. Throws as open_log().
+/// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first kExaminedRows:
+/// where units, signs or sides cannot be right, InputError names the findings, and what to do. CommonOptions::despite
+/// passes over findings by their names. Other fatal findings (nothing excited, a dead signal, efforts late) are left to
+/// the commands, which have an answer of their own to each. A log that lacks columns is not examined. Throws as
+/// open_log().
 [[nodiscard]] SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
                                       const CommonOptions& options, WheelPose pose);
 

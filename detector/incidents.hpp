@@ -44,8 +44,9 @@ struct IncidentOptions {
 /// An event belongs to the open incident where some candidate explains it, too: that fault is consistent with the data
 /// around it, and its onset may lie where the incident's does. Where none does, another incident is opened. An event
 /// that nothing examined explains, or that was not examined, belongs to it where it comes soon
-/// (IncidentOptions::quiet); one that was not asked for (asks()) belongs to it always. Under the hypothesis of one fault at a time the true one
-/// stays among the candidates as isolate() never excludes it; a fault whose size changes is kept, with the last size.
+/// (IncidentOptions::quiet); one that was not asked for (asks()) belongs to it always. Under the hypothesis of one
+/// fault at a time the true one stays among the candidates as isolate() never excludes it; a fault whose size changes
+/// is kept, with the last size.
 class IncidentRecorder {
  public:
   /// What an event did.

@@ -110,8 +110,8 @@ Signal smoothed(const Drive& drive, const Signal& signal, double window) {
   return smooth;
 }
 
-// How fast the joints' torque changes: the sum of squares of its steps over the last `after` s. Over so wide a window that
-// neither play's impact nor its missing torque adds to it.
+// How fast the joints' torque changes: the sum of squares of its steps over the last `after` s. Over so wide a window
+// that neither play's impact nor its missing torque adds to it.
 Signal slew_of(const Drive& drive, double after) {
   constexpr double kWindow = 0.6;  // s
   const Eigen::Index back = std::max<Eigen::Index>(1, std::lround(after / drive.step));

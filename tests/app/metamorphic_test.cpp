@@ -30,8 +30,8 @@ struct Answers {
   Json model, identification, detection;
 };
 
-/// Where `b` is not `a`, by more than `tolerance` of the larger number, nor `later` than it (sentences may then say so);
-/// nothing where it is nowhere. What names files is left out, and what a format has to be interpolated.
+/// Where `b` is not `a`, by more than `tolerance` of the larger number, nor `later` than it (sentences may then say
+/// so); nothing where it is nowhere. What names files is left out, and what a format has to be interpolated.
 std::string difference(const Json& a, const Json& b, double tolerance, double later = 0.0,
                        const std::string& where = "") {
   if (a.is_number() && b.is_number()) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The diagnosis on the independent world: every effect under every law once, each with the least that is expected of the
-// answer (tests/long.sh slow). On the seed here; docs/gap.md has drawn ones.
+// The diagnosis on the independent world: every effect under every law once, each with the least that is expected of
+// the answer (tests/long.sh slow). On the seed here; docs/gap.md has drawn ones.
 #include <gtest/gtest.h>
 
 #include <algorithm>
