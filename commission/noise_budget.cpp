@@ -19,6 +19,9 @@ OutputNoise estimated_noise(const identify::OutputResidual& residual, std::size_
 
 bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
                           const std::vector<identify::ExcitationFinding>& excitation) {
+  if (std::ranges::count(excitation, identify::Excitation::not_excited, &identify::ExcitationFinding::state) == 0) {
+    return false;
+  }
   const auto n = static_cast<Eigen::Index>(noise.size()), p = static_cast<Eigen::Index>(prior.dimension());
   Eigen::VectorXd most(p), largest = Eigen::VectorXd::Zero(n);
   std::vector<bool> told(noise.size(), false), moves(noise.size(), false);

@@ -67,15 +67,9 @@ std::vector<std::string> reported_names(const CandidateTable& table, const std::
   return names;
 }
 
-bool same_causes(std::vector<std::string> a, std::vector<std::string> b) {
-  std::ranges::sort(a);
-  std::ranges::sort(b);
-  return a == b;
-}
-
 bool are_listed(const std::vector<CredibleCauses>& credible, const std::vector<std::string>& effects) {
-  return std::ranges::any_of(credible,
-                             [&](const CredibleCauses& other) { return same_causes(other.effects, effects); });
+  return std::ranges::any_of(
+      credible, [&](const CredibleCauses& other) { return std::ranges::is_permutation(other.effects, effects); });
 }
 
 // Leaves out what does as well with one of its causes steady in time, but for the best.
