@@ -25,27 +25,6 @@ namespace {
 
 constexpr double kMuchUnexplained = 0.2;  // residual over effort, root mean square
 
-// An output in which nothing moved has nothing of the errors that motion brings, down to a bound of 0 where both wheels
-// are logged alike. It comes from the same joints as the others, and is bounded as they are.
-void bound_as_the_others(const Model& model, const std::vector<identify::ExcitationFinding>& excitation,
-                         std::vector<OutputNoise>& noise) {
-  const auto moved = [&](std::size_t output) {
-    return std::ranges::any_of(model.terms, [&](const model::Term& term) {
-      return term.output == output && excitation[term.parameter].state != identify::Excitation::not_excited;
-    });
-  };
-  for (std::size_t i = 0; i < noise.size(); ++i) {
-    for (std::size_t k = 0; k < noise.size() && !moved(i); ++k) {
-      if (moved(k)) {
-        const double share =
-            model.input.row(static_cast<Eigen::Index>(i)).norm() / model.input.row(static_cast<Eigen::Index>(k)).norm();
-        noise[i].bound = std::max(noise[i].bound, share * noise[k].bound);
-        noise[i].learning = std::max(noise[i].learning, share * noise[k].learning);
-      }
-    }
-  }
-}
-
 std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const identify::ExtrapolationOptions& options) {
   std::vector<OutputNoise> noise(s.model.n());
   for (std::size_t i = 0; i < noise.size(); ++i) {
@@ -56,9 +35,6 @@ std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const id
     } else {
       noise[i] = estimated_noise(fit.residuals.outputs[i], fit.residuals.instants, fit.plausible[at], options);
     }
-  }
-  if (!s.noise_complete) {
-    bound_as_the_others(s.model, fit.excitation, noise);
   }
   return noise;
 }
@@ -154,7 +130,7 @@ Bounded bounded_set(LogSource& log, const Setting& s, Part part, const Fit& fit,
   };
   TorqueRows bare = make_rows(log, s, s.declared);
   FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
-  if (!s.noise_complete && cover_untold_outputs(noise, bare_folded, s.prior, fit.excitation)) {
+  if (!s.noise_complete && cover_untold_outputs(noise, bare_folded, s.prior, fit.excitation, s.model.input)) {
     notes.push_back(
         "an output of the model in which nothing was excited tells no noise: its bounds are so wide that no parameter "
         "is bounded and no fault is seen by it; excite it, or declare `noise:` in the robot file");

@@ -18,7 +18,7 @@ OutputNoise estimated_noise(const identify::OutputResidual& residual, std::size_
 }
 
 bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
-                          const std::vector<identify::ExcitationFinding>& excitation) {
+                          const std::vector<identify::ExcitationFinding>& excitation, const Eigen::MatrixXd& input) {
   if (std::ranges::count(excitation, identify::Excitation::not_excited, &identify::ExcitationFinding::state) == 0) {
     return false;
   }
@@ -45,9 +45,17 @@ bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSourc
   }
   bool any = false;
   for (std::size_t i = 0; i < noise.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    for (std::size_t k = 0; k < noise.size() && !told[i]; ++k) {
+      if (told[k]) {
+        const double share = input.row(at).norm() / input.row(static_cast<Eigen::Index>(k)).norm();
+        noise[i].bound = std::max(noise[i].bound, share * noise[k].bound);
+        noise[i].learning = std::max(noise[i].learning, share * noise[k].learning);
+      }
+    }
     if (moves[i] && !told[i]) {
       any = true;
-      noise[i].learning = std::max(noise[i].learning, (1.0 + 1e-9) * largest[static_cast<Eigen::Index>(i)]);
+      noise[i].learning = std::max(noise[i].learning, (1.0 + 1e-9) * largest[at]);
       noise[i].bound = std::max(noise[i].bound, noise[i].learning);
     }
   }
