@@ -115,9 +115,18 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
   return best;
 }
 
+// With noise that is estimated a column of noise alone would be taken for motion without noise: its parameter would be
+// bounded by what that leaves unexplained.
+std::vector<bool> left_out(const Setting& s, const Fit& fit) {
+  const bool any = !s.noise_complete && std::ranges::find(fit.noise_alone, true) != fit.noise_alone.end();
+  return any ? fit.noise_alone : std::vector<bool>();
+}
+
 // The feasible set; where estimated bounds are too small for the prior box (θ̂ may lie outside it), they are raised.
-Bounded bounded_set(LogSource& log, const Setting& s, Part part, const Fit& fit, double risk,
+Bounded bounded_set(LogSource& log, const Setting& setting, Part part, const Fit& fit, double risk,
                     std::vector<OutputNoise>& noise, std::size_t outliers, std::vector<std::string>& notes) {
+  Setting s = setting;
+  s.model = without_columns(std::move(s.model), left_out(setting, fit));
   const auto set_with = [&](const std::vector<OutputNoise>& bounds) {
     return refined_set(log, s, part, with_noise(s, bounds, RowUse::learning), outliers);
   };
@@ -128,17 +137,22 @@ Bounded bounded_set(LogSource& log, const Setting& s, Part part, const Fit& fit,
     }
     return bounded;
   };
-  TorqueRows bare = make_rows(log, s, s.declared);
-  FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
-  if (!s.noise_complete && cover_untold_outputs(noise, bare_folded, s.prior, fit.excitation, s.model.input)) {
-    notes.push_back(
-        "an output of the model in which nothing was excited tells no noise: its bounds are so wide that no parameter "
-        "is bounded and no fault is seen by it; excite it, or declare `noise:` in the robot file");
+  if (!s.noise_complete) {
+    TorqueRows rows = make_rows(log, setting, s.declared);
+    FoldedSource folded(rows, part, s.survey.rows, s.folds);
+    if (cover_untold_outputs(noise, folded, s.prior, fit.excitation, fit.noise_alone, s.model.input)) {
+      notes.push_back(
+          "an output of the model in which a parameter was not excited does not tell what noise it has: its bounds "
+          "allow for any value within the prior, and may be so wide that no fault is seen by it; excite it, declare "
+          "`noise:`, or narrow `prior:` in the robot file");
+    }
   }
   Bounded first = told(set_with(noise));
   if (first.result.set.status == FeasibleSet::Status::nonempty || s.noise_complete) {
     return first;
   }
+  TorqueRows bare = make_rows(log, s, s.declared);
+  FoldedSource bare_folded(bare, part, s.survey.rows, s.folds);
   const double factor = raise_until_explained(
       noise, bare_folded, s.prior, {fit.estimate, fit.residuals, risk}, [&](const std::vector<OutputNoise>& more) {
         return set_with(more).result.set.status == FeasibleSet::Status::nonempty;
@@ -457,6 +471,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   result.dropped = std::move(bounded.result.dropped);
   result.earlier = std::move(bounded.earlier);
   result.prior = s.prior;
+  result.left_out = left_out(s, fit);
   result.row_errors = with_noise(s, result.noise, RowUse::learning);
   result.row_errors.motion = bounded.learning;
   result.parameters = parameter_results(s, fit, result.feasible);

@@ -85,7 +85,8 @@ struct Commissioning {
   std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model
   Box prior;                                     ///< in which the set was sought
   filter::SignalErrors
-      row_errors;  ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
+      row_errors;              ///< dY and dy of the rows that the set is made of: OutputNoise::learning in `output`
+  std::vector<bool> left_out;  ///< p, or empty (none): parameters whose columns the set's rows lack (without_columns())
   std::vector<std::size_t> dropped;  ///< rows of the log whose instants the set leaves out as outliers
   FeasibleSet feasible;              ///< the set, its hull, certificates
   std::vector<EarlierSet>

@@ -53,6 +53,7 @@ constexpr double kMirror = 1.001;          // a true shift is worse than none wi
 constexpr double kUnrelated = 0.05;        // share of an effort's variation that motion must explain of it
 constexpr double kManyStepsOff = 0.2;      // of a step: how near half a step a shift must be to be one
 constexpr double kMuchRaised = 3.0;        // factor on an estimated noise bound
+constexpr double kOwnMotion = 0.2;         // share of a column that is not the others', below which none is told apart
 constexpr double kWheelsDiffer = 1.15;     // ratio of the masses that two wheels show: worth a note
 constexpr double kWheelsContradict = 1.8;  // the same: a unit, a gear or a sensor is wrong
 constexpr double kManyOutside = 0.01;      // of the held-out instants
@@ -210,6 +211,7 @@ void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogCont
 struct JointFit {
   double explained = 1.0;    // share of its square
   Eigen::VectorXd estimate;  // of each column
+  Eigen::VectorXd own;       // share of each column that the others do not explain
   Eigen::VectorXd error;     // standard errors
   double freedom = 1.0;
 };
@@ -285,6 +287,7 @@ std::vector<JointFit> fit_joints(LogSource& log, const Setting& s) {
     const identify::ResidualSummary summary = statistics[j].summary(fit.inverse_gram);
     result.push_back({.explained = fit.weighted_tss > 0.0 ? 1.0 - fit.weighted_rss / fit.weighted_tss : 0.0,
                       .estimate = fit.estimate,
+                      .own = fit.partial_rms.cwiseQuotient(fit.column_rms),
                       .error = summary.standard_error,
                       .freedom = summary.freedom});
   }
@@ -325,7 +328,9 @@ void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, 
   const double right = joints[0].estimate[at], left = joints[1].estimate[at];
   const double least = std::min(right, left), most = std::max(right, left);
   const double error = std::hypot(joints[0].error[at], joints[1].error[at]);
-  if (!(least > 0.0) || most < kWheelsDiffer * least ||
+  // On a circle straight motion and turning are one: which of the two a wheel feels is then not told.
+  const bool apart = joints[0].own[at] > kOwnMotion && joints[1].own[at] > kOwnMotion;
+  if (!apart || !(least > 0.0) || most < kWheelsDiffer * least ||
       most - least < certain(std::min(joints[0].freedom, joints[1].freedom)) * error) {
     return;
   }

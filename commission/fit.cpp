@@ -153,8 +153,15 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
   fit.excitation = judge({});
   std::vector<bool> excluded = flags(fit.excitation);
   fit_with(excluded);
-  const bool corrected = !fit.choice.candidates.empty() && fit.choice.chosen > 0;
+  // A limit of the noise is not taken away from a column that may be made of noise.
+  const bool corrected =
+      !fit.choice.candidates.empty() && fit.choice.chosen > 0 &&
+      !(fit.choice.best().estimator == identify::Estimator::bias_compensated && s.motion_noise->upper_limit);
   judge_further(corrected ? Eigen::VectorXd() : column_noise(s, fit.weights));
+  fit.noise_alone = flags(fit.excitation);
+  for (std::size_t j = 0; j < excluded.size(); ++j) {
+    fit.noise_alone[j] = fit.noise_alone[j] && !excluded[j];
+  }
   if (flags(fit.excitation) != excluded) {
     excluded = flags(fit.excitation);
     fit_with(excluded);
@@ -164,6 +171,15 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
     fit.plausible = identify::largest_plausible_error(rows, fit.estimate, fit.residuals, risk);
   }
   return fit;
+}
+
+Model without_columns(Model model, const std::vector<bool>& parameters) {
+  for (Term& term : model.terms) {
+    if (!parameters.empty() && parameters[term.parameter]) {
+      term.scale = 0.0;
+    }
+  }
+  return model;
 }
 
 Eigen::VectorXd best_guess(Eigen::VectorXd estimate, const std::vector<identify::ExcitationFinding>& excitation,

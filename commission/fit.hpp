@@ -24,7 +24,8 @@ struct Fit {
   Eigen::VectorXd estimate;             ///< p, θ̂ of the chosen estimator
   identify::ResidualSummary residuals;  ///< at θ̂, with θ̂'s covariance
   std::vector<identify::ExcitationFinding> excitation;  ///< one for each parameter
-  Eigen::VectorXd plausible;  ///< per output, largest_plausible_error; empty where noise is declared
+  std::vector<bool> noise_alone;  ///< p: not excited, since what the column holds is no more than noise of the motion
+  Eigen::VectorXd plausible;      ///< per output, largest_plausible_error; empty where noise is declared
 };
 
 /// Errors of the rows that are fitted: efforts and motion between samples as most likely, not in the middle of what is
@@ -33,6 +34,9 @@ struct Fit {
 
 /// Fits `part` of `log`. `risk` is for Fit::plausible.
 [[nodiscard]] Fit fit_log(LogSource& log, const Setting& setting, Part part, double risk);
+
+/// `model` with zeros in the columns of these parameters (p, or empty: none).
+[[nodiscard]] Model without_columns(Model model, const std::vector<bool>& parameters);
 
 /// Moments of `part` of `log`: with the commanded motion as instruments where it is logged.
 [[nodiscard]] identify::RegressionMoments log_moments(LogSource& log, const Setting& setting, Part part);

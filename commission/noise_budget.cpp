@@ -18,23 +18,28 @@ OutputNoise estimated_noise(const identify::OutputResidual& residual, std::size_
 }
 
 bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
-                          const std::vector<identify::ExcitationFinding>& excitation, const Eigen::MatrixXd& input) {
+                          const std::vector<identify::ExcitationFinding>& excitation,
+                          const std::vector<bool>& noise_alone, const Eigen::MatrixXd& input) {
   if (std::ranges::count(excitation, identify::Excitation::not_excited, &identify::ExcitationFinding::state) == 0) {
     return false;
   }
   const auto n = static_cast<Eigen::Index>(noise.size()), p = static_cast<Eigen::Index>(prior.dimension());
-  Eigen::VectorXd most(p), largest = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd most(p), most_noise = Eigen::VectorXd::Zero(p);
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(n), largest_noise = Eigen::VectorXd::Zero(n);
   std::vector<bool> told(noise.size(), false), moves(noise.size(), false);
   for (Eigen::Index j = 0; j < p; ++j) {
     const Interval& side = prior.sides[static_cast<std::size_t>(j)];
     most[j] = std::max(std::abs(side.lower), std::abs(side.upper));
+    most_noise[j] = noise_alone[static_cast<std::size_t>(j)] ? most[j] : 0.0;
   }
   core::RegressionBlock block;
   rows.rewind();
   while (rows.next(block)) {
     for (Eigen::Index r = 0; r < block.rows(); ++r) {
       const auto i = static_cast<std::size_t>(r % n);
-      largest[r % n] = std::max(largest[r % n], std::abs(block.y[r]) + block.Y.row(r).cwiseAbs().dot(most));
+      const auto row = block.Y.row(r).cwiseAbs();
+      largest[r % n] = std::max(largest[r % n], std::abs(block.y[r]) + row.dot(most));
+      largest_noise[r % n] = std::max(largest_noise[r % n], row.dot(most_noise));
       for (Eigen::Index j = 0; j < p; ++j) {
         if (block.Y(r, j) != 0.0) {
           moves[i] = true;
@@ -53,7 +58,10 @@ bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSourc
         noise[i].learning = std::max(noise[i].learning, share * noise[k].learning);
       }
     }
-    if (moves[i] && !told[i]) {
+    if (told[i]) {
+      any = any || largest_noise[at] > 0.0;
+      noise[i].bound += largest_noise[at];
+    } else if (moves[i]) {
       any = true;
       noise[i].learning = std::max(noise[i].learning, (1.0 + 1e-9) * largest[at]);
       noise[i].bound = std::max(noise[i].bound, noise[i].learning);

@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kMostRounding = 0.25;     // of a count: beyond it a multiple cannot be told from its neighbour
 constexpr std::size_t kFewest = 50;        // non-zero speeds below which nothing is claimed
-constexpr double kSharp = 0.01;            // with fewer distinct speeds, how near N must be to a whole number
+constexpr std::size_t kFewestCounts = 8;   // different numbers of counts: a drive at two or three speeds has as few
+constexpr double kSharp = 0.01;            // with less of either, how near N and the counts must be to whole numbers
 constexpr double kMostCounts = 4194304.0;  // 2^22
 
 double turn_over(double quantum, double step) { return 2.0 * std::numbers::pi / (quantum * step); }
@@ -28,6 +29,18 @@ double worst_rounding(std::span<const double> magnitudes, double quantum) {
     }
   }
   return worst;
+}
+
+// How many different numbers of counts sorted `magnitudes` are.
+std::size_t different_counts(std::span<const double> magnitudes, double quantum) {
+  std::size_t different = 0;
+  double last = -1.0;
+  for (const double m : magnitudes) {
+    const double counts = std::round(m / quantum);
+    different += counts != last ? 1 : 0;
+    last = counts;
+  }
+  return different;
 }
 
 // From the smallest speed upwards every multiple sharpens the quantum for the next.
@@ -98,7 +111,7 @@ std::optional<EncoderFinding> search(std::span<const double> speeds, double step
       found = counts;
     }
     const double rounding = worst_rounding(magnitudes, quantum);
-    const bool many = magnitudes.size() >= kFewest;
+    const bool many = magnitudes.size() >= kFewest && different_counts(magnitudes, quantum) >= kFewestCounts;
     if (many ? rounding < kMostRounding : rounding < kSharp && std::abs(counts - std::round(counts)) < kSharp) {
       return EncoderFinding{found, quantum, rounding};
     }

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/bounds/slab_rows.hpp>
+#include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/results/model_json.hpp>
@@ -38,7 +39,8 @@ RegressionBlock named_instants(const ModelClaims& claims, LogSource& log) {
   kept.resize(wanted.size(), claims.model.n(), claims.model.p());
   const auto n = static_cast<Eigen::Index>(claims.model.n());
   std::size_t count = 0;
-  TorqueRows rows(log, RegressorFilter(claims.model, claims.filter, claims.measurement, claims.errors));
+  TorqueRows rows(log, RegressorFilter(commission::without_columns(claims.model, claims.left_out), claims.filter,
+                                       claims.measurement, claims.errors));
   while (rows.next(block)) {
     for (std::size_t k = 0; k < block.instants(); ++k) {
       if (wanted.contains(block.sample[k])) {
@@ -374,6 +376,12 @@ void tell_premises(const ModelClaims& claims, ModelCheck& result) {
                     commission::output_unit(claims.robot, claims.model.output_units[i]), claims.model.outputs[i],
                     claims.origin[i] == core::NoiseOrigin::declared ? "from the declared bounds of the sensors"
                                                                     : "estimated from the residuals of this log"));
+  }
+  for (std::size_t j = 0; j < claims.left_out.size(); ++j) {
+    if (claims.left_out[j]) {
+      result.premises.push_back(fmt::format("that what the log shows of {} is noise alone: its column was left out",
+                                            claims.model.parameters[j].name));
+    }
   }
   if (claims.at_risk) {
     const bool estimated = claims.at_risk->model.warrant == core::Warrant::extrapolated;

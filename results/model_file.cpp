@@ -73,6 +73,16 @@ void read_noise(const JsonPlace& noise, ModelClaims& claims) {
   if (!(claims.errors.output.array() >= 0.0).all()) {
     outputs.fail("bounds >= 0");
   }
+  claims.left_out.assign(claims.model.p(), false);
+  if (noise.has("left_out")) {
+    const JsonPlace names = noise.at("left_out");
+    if (std::ranges::find(claims.origin, core::NoiseOrigin::declared) != claims.origin.end()) {
+      names.fail("no such member where noise is declared");
+    }
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      claims.left_out[parameter_at(names.at(k), claims.model)] = true;
+    }
+  }
 }
 
 void read_parameters(const JsonPlace& place, ModelClaims& claims) {

@@ -67,6 +67,7 @@ struct ModelClaims {
   std::vector<bounds::HalfSpace> facets;                ///< of the set, with their origins; else none
   Box hull;                                             ///< of the set; the prior where it is empty
   std::map<std::string, Interval> physical;             ///< bounds by physical name; none where there is no scale
+  std::vector<bool> left_out;                           ///< p: parameters whose columns the rows of the set lack
   std::vector<std::size_t> dropped;                     ///< rows left out as outliers
   std::size_t sign_parts = 1;                           ///< FeasibleSet::sign_parts
   std::vector<logs::LogFileReport> files;               ///< path, hash, bytes and rows of each file of the log

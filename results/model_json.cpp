@@ -285,6 +285,11 @@ Json noise_json(const Commissioning& r, const Model& model) {
     json["outputs"].push_back(output);
   }
   json["motion"] = motion_errors_json(r.row_errors);
+  for (std::size_t j = 0; j < r.left_out.size(); ++j) {
+    if (r.left_out[j]) {
+      json["left_out"].push_back(model.parameters[j].name);
+    }
+  }
   return json;
 }
 

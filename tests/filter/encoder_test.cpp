@@ -9,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "support/random.hpp"
+
 namespace wheelwright::filter::encoder_test {
 namespace {
 
@@ -128,6 +130,19 @@ TEST(FindEncoder, SmoothSpeedsAreNoEncoder) {
     speeds.push_back(3.0 * std::sin(0.01 * k));
   }
   EXPECT_FALSE(find_encoder(speeds, 0.01));
+}
+
+// Wheels that turn at constant speeds are near whole multiples of something, whatever these speeds are.
+TEST(FindEncoder, TwoOrThreeNoisySpeedsAreNoEncoder) {
+  testing_support::Random random(3);
+  for (const std::vector<double>& wheels :
+       {std::vector{6.1, 4.15}, std::vector{2.0, 4.0, 6.0}, std::vector{1.0, 2.0, 3.0, 4.0, 5.0}}) {
+    std::vector<double> speeds;
+    for (int k = 0; k < 3000; ++k) {
+      speeds.push_back(wheels[static_cast<std::size_t>(k) % wheels.size()] + 0.02 * random.symmetric());
+    }
+    EXPECT_FALSE(find_encoder(speeds, 0.01)) << wheels.size();
+  }
 }
 
 TEST(FindEncoder, KnownCountsAreChecked) {
