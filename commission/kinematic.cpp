@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,6 +13,7 @@
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/pose_origin.hpp>
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/least_squares.hpp>
 
@@ -22,6 +24,7 @@ using Status = KinematicCommissioning::Status;
 
 constexpr double kOdometryConfidence = 0.95;  // of the statistical intervals
 constexpr std::size_t kFewestWindows = 8;
+constexpr double kMostlySeen = 0.9;  // share of a parameter's change that a log must show for it to be given a number
 
 // What is settled before a fit.
 struct Frame {
@@ -32,6 +35,7 @@ struct Frame {
   std::vector<bool> is_declared;
   Box prior;
   Eigen::VectorXd nominal;
+  double rolled = 0.0;  // root mean square of the error of a wheel's turn over a window, rad; 0 where it is not known
   FoldOptions folds;
   identify::ExtrapolationOptions extrapolation;
   std::size_t log_rows = 0;
@@ -42,6 +46,7 @@ struct OdometryFit {
   identify::ResidualSummary residuals;
   std::vector<identify::ExcitationFinding> excitation;
   Eigen::VectorXd plausible;
+  Eigen::VectorXd untold;  // per output: the most that directions of noise alone can add within the prior
 };
 
 struct BoundedSet {
@@ -95,6 +100,9 @@ Frame settle(LogSource& log, const Robot& robot, const filter::OdometryMeasureme
   wheels.count = m.count;
   wheels.nominal_step = m.nominal_step;
   const auto motion = motion_error(robot, wheels);
+  if (motion) {
+    s.rolled = *motion / std::sqrt(3.0) * (m.motion == MotionKind::speed ? s.window : std::numbers::sqrt2);
+  }
   const bool declared_motion = motion && (m.motion == MotionKind::angle || robot.noise.wheel_speed.value ||
                                           robot.noise.wheel_angle.value || robot.encoder_counts_per_turn);
   const bool heading = declared_motion && robot.noise.heading.value;
@@ -143,6 +151,68 @@ Eigen::VectorXd weights_of(const identify::ResidualSummary& residuals) {
   return weights;
 }
 
+// Root mean square of what the errors of the wheels' turns put into each weighted column; elsewhere next to nothing.
+Eigen::VectorXd column_noise(const Frame& s, const Eigen::VectorXd& weights, const Eigen::VectorXd& column_rms) {
+  Eigen::VectorXd noise = (1e-9 * column_rms).cwiseMax(std::numeric_limits<double>::min());
+  const Eigen::Index positions = s.measurement.position ? 2 : 0;
+  noise.head(positions).setConstant(0.5 * weights.head(positions).norm() * s.rolled);
+  noise.segment(positions, 2).setConstant(weights.tail(weights.size() - positions).norm() * s.rolled);
+  return noise;
+}
+
+// Directions in which the columns hold noise alone: wheels that turn in a fixed ratio show what that ratio makes of
+// their radii, and nothing else. Least squares would be drawn along them by the noise.
+struct NoiseDirections {
+  Eigen::MatrixXd directions;  // p × k
+  Eigen::VectorXd most;        // k: largest share of each within the prior about the nominal values
+  Eigen::VectorXd seen;        // p: share of each parameter's own change that the other directions show
+};
+
+// Takes these directions out of the fit of deviations from the nominal values.
+NoiseDirections hold_noise_directions(const Frame& s, const identify::LeastSquares& squares,
+                                      const Eigen::VectorXd& noise, identify::LeastSquaresFit& fit) {
+  constexpr double kSignalOverNoise = 3.0;
+  const Eigen::Index p = noise.size();
+  const Eigen::MatrixXd factor = squares.factor() / std::sqrt(static_cast<double>(squares.instants()));
+  const core::SingularValues svd =
+      core::singular_values(factor.topLeftCorner(p, p) * noise.cwiseInverse().asDiagonal());
+  const auto kept = static_cast<Eigen::Index>(
+      std::ranges::count_if(svd.values, [](double value) { return value >= kSignalOverNoise; }));
+  const Eigen::MatrixXd D = noise.cwiseInverse().asDiagonal() * svd.V;
+  const Eigen::MatrixXd shares = svd.V.transpose() * noise.asDiagonal();  // D⁻¹
+  NoiseDirections out{D.rightCols(p - kept), Eigen::VectorXd::Zero(p - kept), Eigen::VectorXd::Ones(p)};
+  if (kept == p) {
+    return out;
+  }
+  const Eigen::MatrixXd pseudo =
+      D.leftCols(kept) * svd.values.head(kept).cwiseInverse().asDiagonal() * svd.U.leftCols(kept).transpose();
+  fit.estimate = pseudo * factor.col(p).head(p);
+  fit.inverse_gram = pseudo * pseudo.transpose() / static_cast<double>(squares.instants());
+  out.seen = (D.leftCols(kept) * shares.topRows(kept)).diagonal();
+  Eigen::VectorXd reach(p);
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Interval& side = s.prior.sides[static_cast<std::size_t>(j)];
+    reach[j] = std::max(std::abs(side.upper - s.nominal[j]), std::abs(side.lower - s.nominal[j]));
+  }
+  out.most = shares.bottomRows(p - kept).cwiseAbs() * reach;
+  return out;
+}
+
+// Per output, the most that `held` can add to a row.
+Eigen::VectorXd largest_untold(core::RegressionSource& rows, const NoiseDirections& held) {
+  const auto n = static_cast<Eigen::Index>(rows.outputs());
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(n);
+  RegressionBlock block;
+  rows.rewind();
+  while (held.most.size() > 0 && rows.next(block)) {
+    const Eigen::VectorXd size = (block.Y * held.directions).cwiseAbs() * held.most;
+    for (Eigen::Index r = 0; r < size.size(); ++r) {
+      largest[r % n] = std::max(largest[r % n], size[r]);
+    }
+  }
+  return largest;
+}
+
 // Least squares, weighted once more by its own residuals; parameters that the log does not show are held at their
 // nominal values, which the rows are measured from.
 std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
@@ -162,8 +232,12 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
       return std::nullopt;
     }
     std::vector<bool> excluded;
+    NoiseDirections held;
     const auto solve = [&] {
       fit.squares = squares.solve(excluded);
+      if (s.rolled > 0.0 && excluded.empty()) {
+        held = hold_noise_directions(s, squares, column_noise(s, weights, fit.squares.column_rms), fit.squares);
+      }
       fit.squares.estimate += s.nominal;
       identify::ResidualStatistics statistics(fit.squares.estimate, weights);
       rows.rewind();
@@ -179,9 +253,16 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
     for (const identify::ExcitationFinding& finding : fit.excitation) {
       excluded.push_back(finding.state == identify::Excitation::not_excited);
     }
-    if (std::ranges::find(excluded, true) != excluded.end()) {
+    if (held.most.size() == 0 && std::ranges::find(excluded, true) != excluded.end()) {
       solve();
     }
+    for (std::size_t j = 0; j < excluded.size() && held.most.size() > 0; ++j) {
+      if (held.seen[static_cast<Eigen::Index>(j)] < kMostlySeen) {
+        fit.excitation[j].state = identify::Excitation::not_excited;
+        fit.excitation[j].reason = "its motion is no larger than what sensor noise alone would show";
+      }
+    }
+    fit.untold = largest_untold(rows, held);
     weights = weights_of(fit.residuals);
   }
   fit.plausible = identify::largest_plausible_error(rows, fit.squares.estimate, fit.residuals, risk);
@@ -215,8 +296,10 @@ std::vector<OutputNoise> output_noise(const Frame& s, const OdometryFit& fit) {
     if (s.is_declared[i]) {
       noise[i].origin = core::NoiseOrigin::declared;
     } else {
-      noise[i] = estimated_noise(fit.residuals.outputs[i], fit.residuals.instants,
-                                 fit.plausible[static_cast<Eigen::Index>(i)], s.extrapolation);
+      const auto at = static_cast<Eigen::Index>(i);
+      noise[i] = estimated_noise(fit.residuals.outputs[i], fit.residuals.instants, fit.plausible[at], s.extrapolation);
+      noise[i].learning += fit.untold[at];
+      noise[i].bound += fit.untold[at];
     }
   }
   return noise;
