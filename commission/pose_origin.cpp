@@ -64,9 +64,11 @@ class Decimals {
   }
 };
 
-// What a combination of two columns leaves of a third, rms; nothing where that hardly varies.
+// What a combination of two columns leaves of a third, rms; nothing where that hardly varies. Where the columns differ
+// by no more than three times their `noise` (rms), as on a circle, their difference takes no part.
 class Combination {
  public:
+  explicit Combination(double noise = 0.0) : noise_(noise) {}
   void add(double right, double left, double value) {
     const Eigen::Vector2d x(right, left);
     gram_ += x * x.transpose();
@@ -87,7 +89,14 @@ class Combination {
   [[nodiscard]] bool tells(std::size_t fewest = kFewestPoseWindows) const {
     return rows_.size() >= fewest && std::sqrt(square_ / static_cast<double>(rows_.size())) >= kLeastChange;
   }
-  [[nodiscard]] Eigen::Vector2d weights() const { return core::minimum_norm_solution(gram_, moment_); }
+  [[nodiscard]] Eigen::Vector2d weights() const {
+    const core::SingularValues svd = core::singular_values(gram_);
+    if (svd.values[0] > 0.0 && svd.values[1] < 9.0 * noise_ * noise_ * static_cast<double>(rows_.size())) {
+      const Eigen::Vector2d main = svd.V.col(0);
+      return main * (main.dot(moment_) / svd.values[0]);
+    }
+    return core::minimum_norm_solution(gram_, moment_);
+  }
   /// What is left of each value.
   [[nodiscard]] std::vector<double> rests() const {
     const Eigen::Vector2d c = weights();
@@ -104,7 +113,7 @@ class Combination {
   };
   Eigen::Matrix2d gram_ = Eigen::Matrix2d::Zero();
   Eigen::Vector2d moment_ = Eigen::Vector2d::Zero();
-  double square_ = 0.0;
+  double square_ = 0.0, noise_ = 0.0;
   std::vector<Row> rows_;
 };
 
@@ -158,7 +167,7 @@ std::optional<double> between_rests(const std::vector<Kept>& segments) {
 // is that of the kinks: a sample bends the line at two rows at most.
 std::optional<double> within_interpolation(const std::vector<Kept>& segments, double window, double step,
                                            double count) {
-  Combination windows;
+  Combination windows(count / std::sqrt(6.0));
   std::size_t bent = 0, moving = 0;
   std::vector<std::pair<const Kept*, std::array<std::size_t, 2>>> places;
   for (const Kept& log : segments) {
