@@ -12,7 +12,8 @@
 namespace wheelwright::commission {
 namespace {
 
-constexpr double kConfidence = 0.95;  // of the statistical intervals
+constexpr double kConfidence = 0.95;   // of the statistical intervals
+constexpr double kUnexplained = 0.95;  // residual over effort, root mean square: a tenth of the square is explained
 constexpr double kRunAway = 3.0;  // ratio of simulated to measured speeds beyond which a simulation is no instrument
 
 // Root mean square of what the noise of the motion alone puts into each weighted column; zero where it is not known.
@@ -73,6 +74,26 @@ identify::ResidualSummary summarise(core::RegressionSource& rows, const Fit& fit
     summary.freedom = best.freedom;
   }
   return summary;
+}
+
+// Where the noise of the motion is not known: parameters of outputs alone whose efforts the motion does not explain may
+// be made of it, and so may inertias (which are not zero) that are not told from zero.
+void judge_unexplained(const Model& model, const identify::ResidualSummary& residuals,
+                       std::vector<identify::ExcitationFinding>& findings) {
+  std::vector<bool> told(model.p(), false);
+  for (const Term& term : model.terms) {
+    const identify::OutputResidual& output = residuals.outputs[term.output];
+    const bool inertia = term.kind == Term::Kind::acceleration;
+    told[term.parameter] =
+        told[term.parameter] || (output.rms < kUnexplained * output.torque_rms &&
+                                 !(inertia && findings[term.parameter].state == identify::Excitation::indistinct));
+  }
+  for (std::size_t j = 0; j < findings.size(); ++j) {
+    if (!told[j] && findings[j].state != identify::Excitation::not_excited) {
+      findings[j].state = identify::Excitation::not_excited;
+      findings[j].reason = "nothing of its motion shows in the effort, and what noise the motion has is not known";
+    }
+  }
 }
 
 double t_quantile(const identify::ResidualSummary& summary) {
@@ -158,6 +179,9 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
       !fit.choice.candidates.empty() && fit.choice.chosen > 0 &&
       !(fit.choice.best().estimator == identify::Estimator::bias_compensated && s.motion_noise->upper_limit);
   judge_further(corrected ? Eigen::VectorXd() : column_noise(s, fit.weights));
+  if (!s.motion_noise) {
+    judge_unexplained(s.model, fit.residuals, fit.excitation);
+  }
   fit.noise_alone = flags(fit.excitation);
   for (std::size_t j = 0; j < excluded.size(); ++j) {
     fit.noise_alone[j] = fit.noise_alone[j] && !excluded[j];

@@ -26,6 +26,7 @@ struct World {
   double noise;   // of torques, N·m
   Way way;
   Sensor sensor = Sensor::counts;
+  double step = 0.01;  // s
 };
 
 LogTable drive(const World& w, std::uint64_t seed) {
@@ -37,14 +38,14 @@ LogTable drive(const World& w, std::uint64_t seed) {
   }
   std::array<double, 2> low{};
   log.columns.resize(4);
-  constexpr double h = 0.01;
+  const double h = w.step;
   const double count = 2.0 * std::numbers::pi / w.counts;
   std::array<double, 2> angle{count * random.unit(), count * random.unit()};  // edges of counts at different angles
   const bool steady = w.way == Way::steady;
   double v = steady ? 0.5 : 0.0, turning = v, force = 0.0, last = 0.0;
   for (int k = 0; k < 4000; ++k) {
     const bool drives = w.way != Way::standstill || (k > 1000 && k < 1400);
-    if (k % 50 == 0) {
+    if (k % static_cast<int>(0.5 / h) == 0) {
       force = drives ? w.mass * (random.symmetric() + 0.2) : 0.0;
       last = drives ? w.inertia * 3.0 * random.symmetric() : 0.0;
     }
@@ -99,8 +100,9 @@ void expect_the_truth(const World& w, std::uint64_t seed) {
   CommissionOptions options;
   options.at_risk = CommissionOptions::AtRisk::nothing;
   const Commissioning c = commission_robot(log, robot_of(w), options);
-  const std::string what = fmt::format("mass {} way {} sensor {} noise {} seed {}: {}", w.mass, static_cast<int>(w.way),
-                                       static_cast<int>(w.sensor), w.noise, seed, c.message);
+  const std::string what =
+      fmt::format("mass {} way {} sensor {} step {} noise {} seed {}: {}", w.mass, static_cast<int>(w.way),
+                  static_cast<int>(w.sensor), w.step, w.noise, seed, c.message);
   // On a circle at constant speed efforts without noise never change, which is refused.
   EXPECT_EQ(c.status == Commissioning::Status::contradicted, w.way == Way::steady && w.noise == 0.0) << what;
   const std::array truth{w.mass, w.inertia, w.friction, w.yaw_friction};
@@ -129,10 +131,13 @@ TEST(UntoldNoise, NorIsItWithMeasuredSpeeds) {
   for (World w : kRobots) {
     for (const Way way : {Way::straight, Way::circle, Way::standstill, Way::steady}) {
       for (const Sensor sensor : {Sensor::white, Sensor::smooth}) {
-        w.way = way;
-        w.sensor = sensor;
-        w.noise = 0.01 * w.mass * w.radius;
-        expect_the_truth(w, 1);
+        for (const double step : {0.05, 0.02, 0.01, 0.001}) {
+          w.way = way;
+          w.sensor = sensor;
+          w.step = step;
+          w.noise = 0.01 * w.mass * w.radius;
+          expect_the_truth(w, 1);
+        }
       }
     }
   }
