@@ -290,7 +290,7 @@ constexpr double unseen = 9.0 / 8.0;
 }  // namespace
 
 StreamAligner::StreamAligner(std::size_t width, std::vector<AlignedStream> streams, std::int64_t patience)
-    : width_(width), patience_(patience), newest_(std::numeric_limits<std::int64_t>::min()), error_(width, 0.0) {
+    : patience_(patience), newest_(std::numeric_limits<std::int64_t>::min()), error_(width, 0.0) {
   check::that(!streams.empty(), "streams", "at least one");
   std::vector<bool> taken(width, false);
   for (AlignedStream& layout : streams) {

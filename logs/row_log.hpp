@@ -213,7 +213,6 @@ class StreamAligner {
   [[nodiscard]] bool ready(std::int64_t time) const;
   void interpolate(Stream& stream, std::int64_t time, std::span<double> row);
 
-  std::size_t width_;
   std::vector<Stream> streams_;
   std::int64_t patience_;
   std::int64_t newest_;
