@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -40,10 +41,22 @@ inline void require(bool holds) {
   }
 }
 
+/// Calls `use`, which must not find what it reads bad.
+template <typename Use>
+void promised(const Use& use) {
+  try {
+    use();
+  } catch (const InputError& error) {
+    std::fputs(error.what(), stderr);
+    std::abort();
+  }
+}
+
 /// Puts `bytes` into a file of this process with that ending, and returns its path.
 inline std::filesystem::path on_disk(std::string_view bytes, const std::string& ending) {
   const auto path =
       std::filesystem::temp_directory_path() / ("wheelwright-fuzz-" + std::to_string(::getpid()) + ending);
+  std::filesystem::remove(path);  // a file that is new is not flushed to disk on closing
   std::ofstream(path, std::ios::binary | std::ios::trunc)
       .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   return path;

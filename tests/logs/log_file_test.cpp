@@ -376,5 +376,17 @@ TEST_F(LogFile, DamagedHdf5IsReadOrRefused) {
   }
 }
 
+// The library would read what stands behind the attribute.
+TEST_F(LogFile, ADatasetWithDamagedAttributesIsRefused) {
+  const std::string content = bytes(write("whole.h5", drive()));
+  const std::size_t name = content.find("units");
+  ASSERT_NE(name, std::string::npos);
+  for (const std::string damage : {"\xf8\xff", "\xf8\xff\x8a\x97"}) {  // of the bytes of its dataspace, and of its name
+    std::string damaged = content;
+    const auto file = put("damaged.h5", damaged.replace(name - 2, damage.size(), damage));
+    EXPECT_THAT(input_error([&] { read({file}); }), HasSubstr("has an attribute that ends outside of itself"));
+  }
+}
+
 }  // namespace
 }  // namespace wheelwright::logs::log_file_test
