@@ -104,9 +104,24 @@ class Header {
           return fmt::format("is stored in chunks of {} dimensions: expected 1; the file is damaged",
                              dimensions > 0 ? dimensions - 1 : 0);
         }
+        if (kind == chunked && has_empty_side(data, version, dimensions)) {
+          return "is stored in chunks with a side of 0: the file is damaged";
+        }
       }
     }
     return {};
+  }
+
+  // Sides of a chunk and the size of an element stand behind what the version has before them.
+  [[nodiscard]] bool has_empty_side(std::string_view data, std::uint64_t version, std::uint64_t dimensions) const {
+    const std::size_t at = version < 3 ? 8 + sizes_.offset : version == 3 ? 3 + sizes_.offset : 5;
+    const std::size_t width = version < 4 ? 4 : number(data, 4, 1);
+    for (std::size_t k = 0; k < dimensions; ++k) {
+      if (number(data, at + k * width, width) == 0) {
+        return true;
+      }
+    }
+    return false;
   }
 
   mcap::WindowedFile& file_;
