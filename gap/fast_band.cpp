@@ -121,7 +121,9 @@ Signal slew_of(const Drive& drive, double after) {
     for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
       const auto [first, last] = drive.segment(s);
       double sum = 0.0;
-      const auto step = [&, begin = first](Eigen::Index k) { return k > begin ? std::pow(effort[k] - effort[k - 1], 2) : 0.0; };
+      const auto step = [&, begin = first](Eigen::Index k) {
+        return k > begin ? std::pow(effort[k] - effort[k - 1], 2) : 0.0;
+      };
       for (Eigen::Index k = first; k < last; ++k) {
         sum += step(k) - (k - back > first ? step(k - back) : 0.0);
         slew[k] += sum;
