@@ -59,7 +59,7 @@ std::vector<FaultMargins> margins_at_risk(const SumDrive& drive, const OnlineMod
   core::for_all(
       faults.size(), options.threads,
       [&](std::size_t f) {
-        const auto [first, count] = sides[f];
+        const std::size_t first = sides[f].first, count = sides[f].second;
         const std::size_t windows = options.windows.size();
         std::vector<Candidate> best(onsets.size() * count * windows);
         SumResponse response(faults[f], model, motion, drive);

@@ -175,13 +175,12 @@ void check_steps(const HealthView& view, std::vector<LogFinding>& out) {
   const double median = view.step;
   std::vector<bool> late(view.log->rows(), false);
   std::size_t missing = 0;
-  double sum = 0.0, squares = 0.0, n = 0.0;
+  double squares = 0.0, n = 0.0;
   for (std::size_t i = 0; i < steps.length.size(); ++i) {
     if (steps.length[i] > kMissing * median) {
       late[steps.row[i]] = late[steps.row[i] - 1] = true;
       missing += static_cast<std::size_t>(std::max(1.0, std::round(steps.length[i] / median) - 1.0));
     } else {
-      sum += steps.length[i];
       squares += (steps.length[i] - median) * (steps.length[i] - median);
       n += 1.0;
     }

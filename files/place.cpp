@@ -112,6 +112,9 @@ std::string YamlPlace::text(std::string_view expected) const {
   if (!is_scalar()) {
     fail(expected);
   }
+  if (!is_utf8(node_->node.Scalar())) {
+    fail(std::string(expected) + " in UTF-8");
+  }
   return node_->node.Scalar();
 }
 

@@ -71,4 +71,7 @@ template <typename Value, std::size_t n>
 /// those that turn the direction of writing, and bytes that are no UTF-8 are "\\x1B". The rest is as it was.
 [[nodiscard]] std::string printable(std::string_view text);
 
+/// True if `text` is UTF-8 (Unicode 15, table 3-7).
+[[nodiscard]] bool is_utf8(std::string_view text);
+
 }  // namespace wheelwright::files

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
-#include <ranges>
 #include <utility>
 
 #include <fmt/format.h>
@@ -330,7 +330,9 @@ double size_for(const Column& column, const Drive& drive, double share) {
 }  // namespace
 
 std::string Rival::name() const {
-  return fmt::format("{}", fmt::join(causes | std::views::transform(&RivalCause::effect), " + "));
+  std::vector<std::string> effects;
+  std::ranges::transform(causes, std::back_inserter(effects), &RivalCause::effect);
+  return fmt::format("{}", fmt::join(effects, " + "));
 }
 
 void validate(const Rival& rival, const std::vector<Effect>& catalogue, const Drive& drive) {

@@ -121,7 +121,9 @@ Signal slew_of(const Drive& drive, double after) {
     for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
       const auto [first, last] = drive.segment(s);
       double sum = 0.0;
-      const auto step = [&](Eigen::Index k) { return k > first ? std::pow(effort[k] - effort[k - 1], 2) : 0.0; };
+      const auto step = [&, begin = first](Eigen::Index k) {
+        return k > begin ? std::pow(effort[k] - effort[k - 1], 2) : 0.0;
+      };
       for (Eigen::Index k = first; k < last; ++k) {
         sum += step(k) - (k - back > first ? step(k - back) : 0.0);
         slew[k] += sum;
@@ -266,7 +268,7 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
                                           const FastBandOptions& options) {
   constexpr double kMostOfAStep = 0.5;
   constexpr double kWide = 1.5;  // corners' ratio
-  constexpr std::size_t kFewestRows = 500;
+  constexpr std::size_t kFewestBandRows = 500;
   constexpr std::size_t kParts = 24;
   constexpr double kNearlyAll = 0.9;
   const Drive& drive = prepared.drive;
@@ -279,7 +281,7 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
   const Drive& healthy = *prepared.healthy_drive;
   const std::vector<Eigen::Index> rows = band_rows(drive, band, options.row_step);
   const std::vector<Eigen::Index> healthy_rows = band_rows(healthy, band, options.row_step);
-  if (rows.size() < kFewestRows || healthy_rows.size() < kFewestRows) {
+  if (rows.size() < kFewestBandRows || healthy_rows.size() < kFewestBandRows) {
     return std::nullopt;
   }
   std::vector<FittedEffect> all = robots_own(prepared.healthy);

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -271,8 +271,10 @@ std::vector<Effect> chosen_catalogue(const Model& model, const DiagnoseOptions& 
   for (const std::string& name : options.without) {
     const auto gone = std::remove_if(all.begin(), all.end(), [&](const Effect& e) { return e.name == name; });
     if (gone == all.end()) {
+      std::vector<std::string> names;
+      std::ranges::transform(all, std::back_inserter(names), &Effect::name);
       throw InvalidArgument(fmt::format("DiagnoseOptions::without: there is no effect called {}; there are {}", name,
-                                        fmt::join(all | std::views::transform(&Effect::name), ", ")));
+                                        fmt::join(names, ", ")));
     }
     all.erase(gone, all.end());
   }

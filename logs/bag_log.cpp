@@ -251,7 +251,7 @@ class BagWalk final : public RowWalk {
       return;
     }
     stream.columns = reading.slots;
-    stream.longest_gap = static_cast<std::int64_t>(gap_factor * static_cast<double>(clock.median_step));
+    stream.longest_gap = longest_gap_of(clock.median_step);
     stream.time_error = clock.jitter;
     reading.extractor.emplace(definition, fields);
     reading.numbers.resize(fields.size());
@@ -278,9 +278,7 @@ class BagWalk final : public RowWalk {
     Reading& reading = *found;
     ++reading.messages;
     if (!reading.extractor->read(message.data, reading.numbers)) {
-      if (reading.damaged++ == 0) {
-        reading.first_damage = fmt::format("message {}: {}", reading.messages, reading.extractor->error());
-      }
+      damage(reading, reading.extractor->error());
       return;
     }
     std::int64_t time = message.log_time;
@@ -292,6 +290,11 @@ class BagWalk final : public RowWalk {
       }
       time = stamp.value_or(0);
     }
+    const double shifted = static_cast<double>(time) + static_cast<double>(reading.clock.shift);
+    if (!(std::abs(shifted) < static_cast<double>(farthest_time))) {
+      damage(reading, "its time is more than 146 years away");
+      return;
+    }
     const double* number = reading.numbers.data();
     for (std::size_t k = 0; k < reading.columns.size(); ++k) {
       reading.values[k] = value_of(reading.columns[k], number);
@@ -302,6 +305,12 @@ class BagWalk final : public RowWalk {
       return;
     }
     put_in_order(static_cast<std::size_t>(found - readings_.begin()), time + reading.clock.shift);
+  }
+
+  static void damage(Reading& reading, const std::string& why) {
+    if (reading.damaged++ == 0) {
+      reading.first_damage = fmt::format("message {}: {}", reading.messages, why);
+    }
   }
 
   /// Keeps the values of a reading back until none that is up to longest_late earlier can come. A time that goes back

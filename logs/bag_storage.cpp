@@ -17,6 +17,7 @@
 #include <wheelwright/logs/database.hpp>
 #include <wheelwright/logs/mcap.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
+#include <wheelwright/logs/row_log.hpp>
 
 namespace wheelwright::logs::bag {
 namespace {
@@ -35,7 +36,7 @@ class McapSource final : public Source {
   bool next(BagMessage& message) override {
     McapMessage found;
     while (reader_.next(found)) {
-      if (found.log_time > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max())) {
+      if (found.log_time >= static_cast<std::uint64_t>(farthest_time)) {
         ++late_;
         continue;
       }
@@ -57,7 +58,7 @@ class McapSource final : public Source {
     BagReport report{shown_, "mcap", own.file_size, own.hash, messages_, sentences(own)};
     if (late_ > 0) {
       report.losses.push_back(
-          fmt::format("{}: {} messages have a log time of 2^63 ns or more and are left out", shown_, late_));
+          fmt::format("{}: {} messages have a log time of 2^62 ns or more and are left out", shown_, late_));
     }
     return report;
   }
@@ -161,7 +162,8 @@ class SqliteSource final : public Source {
     BagReport report{shown_, "sqlite3", bytes_, hash_, messages_, losses_};
     if (foreign_ > 0) {
       report.losses.push_back(fmt::format(
-          "{}: table messages: {} rows are left out, whose topic or time is no integer or whose data are no bytes",
+          "{}: table messages: {} rows are left out, whose topic or time is no integer, whose time is not one "
+          "from 0 to 2^62 ns, or whose data are no bytes",
           shown_, foreign_));
     }
     for (const auto& [topic, count] : unknown_) {
@@ -315,6 +317,10 @@ class SqliteSource final : public Source {
     const std::int64_t time = rows_.integer(2);
     sum_ += mixed(row, time);
     last_time_ = time;
+    if (time < 0 || time >= farthest_time) {
+      ++foreign_;
+      return false;
+    }
     const auto topic = places_.find(rows_.integer(1));
     if (topic == places_.end()) {
       ++unknown_[unknown_.size() < most_unknown || unknown_.contains(rows_.integer(1)) ? rows_.integer(1) : any_other];

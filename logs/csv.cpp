@@ -144,7 +144,7 @@ class MergedCsvWalk final : public RowWalk {
       for (const std::size_t c : stream.columns) {
         of.angle.push_back(names[c] == "theta");
       }
-      of.longest_gap = static_cast<std::int64_t>(gap_factor * static_cast<double>(stream.median_step));
+      of.longest_gap = longest_gap_of(stream.median_step);
       aligned.push_back(std::move(of));
     }
     aligner_.emplace(names.size(), std::move(aligned));
@@ -209,6 +209,11 @@ class MergedCsvWalk final : public RowWalk {
       return false;
     }
     const std::span<const double> values = rows_.row();
+    if (!(std::abs(values[0]) * 1e9 < static_cast<double>(farthest_time))) {
+      throw InputError(
+          fmt::format("{}: time {} s: expected one within 146 years, where columns are filled in rows apart",
+                      cleaner_.at(number), values[0]));
+    }
     const std::int64_t ns = std::llround(values[0] * 1e9);
     bool whole = true;
     for (std::size_t s = 0; s < streams_.size(); ++s) {
@@ -465,7 +470,7 @@ std::vector<CsvStream> CsvStreamFinder::streams() const {
         before = t_[k];
       }
     }
-    found[s].median_step = std::llround(middle_of(steps) * 1e9);
+    found[s].median_step = std::llround(std::min(middle_of(steps) * 1e9, static_cast<double>(farthest_time)));
   }
   const auto weight = [&](const CsvStream& stream) {
     int sum = 0;

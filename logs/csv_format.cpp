@@ -253,12 +253,18 @@ std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
       const char* q = files::parse_number(p, end, value);
       if (q == nullptr || (q != end && *q != separator)) {
         q = read_odd_field(p, end, field, value, defect);
-      } else if (slot == 0 && (!clock_.known || clock_.seconds < 1.0)) {
-        convert_time({p, static_cast<std::size_t>(q - p)});
-      } else if (!(std::abs(value) <= limits[index])) {
-        const Fault fault = std::isfinite(value) ? Fault::limit : may_miss(index) ? Fault::none : Fault::not_finite;
-        if (fault > defect.fault) {
-          defect = {fault, field, std::string_view(p, static_cast<std::size_t>(q - p))};
+      } else {
+        const std::string_view text(p, static_cast<std::size_t>(q - p));
+        if (slot == 0 && (!clock_.known || clock_.seconds < 1.0)) {
+          convert_time(text);
+        }
+        if (!(std::abs(value) <= limits[index])) {
+          const Fault fault = std::isfinite(value) ? Fault::limit : Fault::not_finite;
+          if (fault == Fault::not_finite && may_miss(index)) {
+            value = std::numeric_limits<double>::quiet_NaN();
+          } else if (fault > defect.fault) {
+            defect = {fault, field, text};
+          }
         }
       }
       p = q;
@@ -272,9 +278,12 @@ std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
 
 void CsvRowReader::convert_time(std::string_view text) {
   double& t = values_[0];
+  if (!std::isfinite(t)) {
+    return;
+  }
   std::int64_t count = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-  const bool whole = error == std::errc() && end == text.data() + text.size();
+  const bool whole = error == std::errc() && end == text.data() + text.size() && count >= 0;
   if (!clock_.known) {
     clock_.known = true;
     if (whole && t > cleaner_.limits()[0]) {
@@ -322,10 +331,13 @@ const char* CsvRowReader::read_odd_field(const char* p, const char* end, std::si
     fault = means_missing(text) ? Fault::empty : Fault::text;
   } else if (!std::isfinite(value)) {
     fault = Fault::not_finite;
-  } else if (slots_[field] == 0 && (!clock_.known || clock_.seconds < 1.0)) {
-    convert_time(text);
-  } else if (!(std::abs(value) <= cleaner_.limits()[static_cast<std::size_t>(slots_[field])])) {
-    fault = Fault::limit;
+  } else {
+    if (slots_[field] == 0 && (!clock_.known || clock_.seconds < 1.0)) {
+      convert_time(text);
+    }
+    if (!(std::abs(value) <= cleaner_.limits()[static_cast<std::size_t>(slots_[field])])) {
+      fault = Fault::limit;
+    }
   }
   if ((fault == Fault::empty || fault == Fault::not_finite) && may_miss(static_cast<std::size_t>(slots_[field]))) {
     value = std::numeric_limits<double>::quiet_NaN();

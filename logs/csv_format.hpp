@@ -70,7 +70,7 @@ class CsvRowReader {
   /// wrong number of fields, and a value beyond LogColumn::limit.
   RowOutcome read(std::string_view line, std::size_t line_number, bool terminated);
 
-  /// Columns (marks in the order of `names`) that may be missing: an empty or NaN field of theirs is then NaN, and no
+  /// Columns (marks in the order of `names`) that may be missing: an empty, NaN or infinite field of theirs is then NaN, and no
   /// reason to drop the row. For read_numbers().
   void let_miss(std::vector<bool> columns);
 

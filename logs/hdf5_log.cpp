@@ -69,19 +69,25 @@ bool is_number(hid_t type) {
   return kind == H5T_INTEGER || kind == H5T_FLOAT || kind == H5T_ENUM;
 }
 
-/// The text of attribute `units` or `unit`; empty where there is none.
-std::string unit_of(hid_t dataset) {
+/// The text of attribute `units` or `unit`; empty where there is none. Nothing where the attributes are damaged: the
+/// library must not be asked about them again, since it then reads what it has freed.
+std::optional<std::string> unit_of(hid_t dataset) {
   for (const char* name : {"units", "unit"}) {
-    if (H5Aexists(dataset, name) <= 0) {
+    const htri_t exists = H5Aexists(dataset, name);
+    if (exists < 0) {
+      return std::nullopt;
+    }
+    if (exists == 0) {
       continue;
     }
     const Handle attribute(H5Aopen(dataset, name, H5P_DEFAULT), H5Aclose);
     const Handle type(attribute ? H5Aget_type(attribute.get()) : -1, H5Tclose);
-    if (!type || H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) < 0) {
-      continue;
+    const Handle space(attribute ? H5Aget_space(attribute.get()) : -1, H5Sclose);
+    if (!type || !space) {
+      return std::nullopt;
     }
-    const Handle space(H5Aget_space(attribute.get()), H5Sclose);
-    if (!space || H5Sget_simple_extent_npoints(space.get()) != 1) {
+    if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) < 0 ||
+        H5Sget_simple_extent_npoints(space.get()) != 1) {
       continue;
     }
     if (H5Tis_variable_str(type.get()) > 0) {
@@ -99,7 +105,7 @@ std::string unit_of(hid_t dataset) {
       return unit.substr(0, std::min(unit.find('\0'), unit.size()));
     }
   }
-  return {};
+  return "";
 }
 
 /// Why a dataset is not read: what it says of its place is followed with trust only, and its size must be one that a
@@ -150,7 +156,8 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
   H5Sget_simple_extent_dims(space.get(), &rows, nullptr);
   const std::string refused = refusal(dataset.get(), type.get(), rows, trust);
   if (is_number(type.get())) {
-    sources.push_back({path, "", unit_of(dataset.get()), rows, refused});
+    const std::optional<std::string> unit = unit_of(dataset.get());
+    sources.push_back({path, "", unit.value_or(""), rows, unit ? refused : "has damaged attributes"});
   } else if (H5Tget_class(type.get()) == H5T_COMPOUND) {
     const int members = H5Tget_nmembers(type.get());
     for (int k = 0; k < members; ++k) {

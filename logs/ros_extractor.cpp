@@ -261,7 +261,6 @@ struct Walk {
 
   /// Whether `cdr` is a message of the type.
   bool read(std::string_view cdr, const std::string& type) {
-    const Step message;
     if (cdr.size() < encapsulation || cdr[0] != 0 || (cdr[1] != 0 && cdr[1] != 1)) {
       error = cdr.size() < encapsulation
                   ? fmt::format("only {} bytes: expected a message in CDR", cdr.size())

@@ -289,8 +289,13 @@ constexpr double unseen = 9.0 / 8.0;
 
 }  // namespace
 
+std::int64_t longest_gap_of(std::int64_t median_step) {
+  return static_cast<std::int64_t>(
+      std::min(gap_factor * static_cast<double>(median_step), static_cast<double>(farthest_time)));
+}
+
 StreamAligner::StreamAligner(std::size_t width, std::vector<AlignedStream> streams, std::int64_t patience)
-    : width_(width), patience_(patience), newest_(std::numeric_limits<std::int64_t>::min()), error_(width, 0.0) {
+    : patience_(patience), newest_(std::numeric_limits<std::int64_t>::min()), error_(width, 0.0) {
   check::that(!streams.empty(), "streams", "at least one");
   std::vector<bool> taken(width, false);
   for (AlignedStream& layout : streams) {
@@ -306,6 +311,7 @@ StreamAligner::StreamAligner(std::size_t width, std::vector<AlignedStream> strea
 void StreamAligner::push(std::size_t stream, std::int64_t time, std::span<const double> values) {
   Stream& own = streams_[stream];
   check::that(values.size() == own.layout.columns.size(), "values", "one for each column of the stream");
+  check::that(-farthest_time < time && time < farthest_time, "time", "a time within 146 years");
   if (stream > 0 && !own.samples.empty() && time <= own.samples.back().time) {
     ++own.stale;
     return;

@@ -160,6 +160,12 @@ class RowLog : public RecordedLog {
 /// A step of more than this times the median step is a gap.
 inline constexpr double gap_factor = 5.0;
 
+/// Times in ns that samples have are below this, either way: 146 years. So differences of two are numbers, too.
+inline constexpr std::int64_t farthest_time = std::int64_t{1} << 62;
+
+/// The longest gap of a stream whose median step is `median_step`, both in ns.
+[[nodiscard]] std::int64_t longest_gap_of(std::int64_t median_step);
+
 /// One stream: which columns of a row it gives.
 struct AlignedStream {
   std::vector<std::size_t> columns;  ///< of the row, one for each value of a sample
@@ -183,7 +189,8 @@ class StreamAligner {
   StreamAligner(std::size_t width, std::vector<AlignedStream> streams, std::int64_t patience = 2'000'000'000);
 
   /// A sample of `stream` at `time` (ns). Of other streams than the first, samples that are not later than the one
-  /// before are left out (stale()).
+  /// before are left out (stale()). Throws InvalidArgument for another number of values, and unless |time| is below
+  /// farthest_time.
   void push(std::size_t stream, std::int64_t time, std::span<const double> values);
 
   /// No more samples come.
@@ -213,7 +220,6 @@ class StreamAligner {
   [[nodiscard]] bool ready(std::int64_t time) const;
   void interpolate(Stream& stream, std::int64_t time, std::span<double> row);
 
-  std::size_t width_;
   std::vector<Stream> streams_;
   std::int64_t patience_;
   std::int64_t newest_;

@@ -124,7 +124,7 @@ WheelJoints driven_wheels(const RobotTree& tree, const NamedWheels& named) {
                       tree.place.text(), found.size(), described(found)));
     }
     std::ranges::stable_sort(found, std::greater(), [](const TreeJoint& j) { return j.origin.x(); });
-    std::ranges::stable_partition(found, [](const TreeJoint& j) { return j.origin.y() > 0.0; });
+    std::stable_partition(found.begin(), found.end(), [](const TreeJoint& j) { return j.origin.y() > 0.0; });
     const auto second = static_cast<std::ptrdiff_t>(found.size() / 2);
     WheelJoints out{found[static_cast<std::size_t>(second)],
                     found.front(),

@@ -8,6 +8,7 @@
 #   tools/setup.sh --ci     the same and clang-format, clang-tidy and clang, which continuous integration uses, and what some
 #                           tests need that are skipped elsewhere: a browser, shells, man (half a minute, nearly all of it
 #                           Chromium's)
+#   tools/setup.sh --fuzz   the same as without and clang with its run-time libraries
 #   tools/setup.sh --docs, tools/setup.sh --packages
 #                           the same as without and what tools/docs.sh, tools/package.sh and tools/check_package.sh need
 set -eu
@@ -27,9 +28,10 @@ case "${1:-}" in
   '') ;;
   --ci) everything="$everything clang clang-format clang-tidy python3-mypy python3-matplotlib
     chromium zsh fish man-db groff-base" ;;
+  --fuzz) everything="$everything clang-14 libclang-rt-14-dev" ;;
   --docs) everything="$everything python3-sphinx python3-myst-parser python3-sphinxcontrib.bibtex doxygen graphviz" ;;
   --packages) everything="$everything dpkg-dev file fakeroot lintian debootstrap" ;;
-  *) echo "usage: tools/setup.sh [program | --ci | --docs | --packages]" >&2; exit 2 ;;
+  *) echo "usage: tools/setup.sh [program | --ci | --fuzz | --docs | --packages]" >&2; exit 2 ;;
 esac
 packages="$packages $everything"
 

@@ -44,5 +44,14 @@ TEST(Printable, BytesThatAreNoUtf8AreShown) {
   EXPECT_EQ(printable("\xF0\x9F\xA4"), "\\xF0\\x9F\\xA4");
 }
 
+TEST(Utf8, IsTold) {
+  for (const char* text : {"", "example", "ü", "€", "🤖", "\x7F"}) {
+    EXPECT_TRUE(is_utf8(text)) << text;
+  }
+  for (const char* text : {"exam\xD7le", "\xC3", "\xC0\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\x80"}) {
+    EXPECT_FALSE(is_utf8(text)) << text;
+  }
+}
+
 }  // namespace
 }  // namespace wheelwright::files::printable_test

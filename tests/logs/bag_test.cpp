@@ -276,13 +276,15 @@ TEST_F(Bag, RowsThatAreNoMessagesAreCounted) {
     sql.run(
         "INSERT INTO messages (topic_id, timestamp, data) VALUES (1, 'noon', x'00'); "
         "INSERT INTO messages (topic_id, timestamp, data) VALUES (1, 7, 'text'); "
+        "INSERT INTO messages (topic_id, timestamp, data) VALUES (1, 9223372036854775807, x'00'); "
+        "INSERT INTO messages (topic_id, timestamp, data) VALUES (1, -1, x'00'); "
         "DELETE FROM messages WHERE id = 3");
   }
   const auto bag = open("a.db3");
   EXPECT_EQ(all_items(*bag).size(), 5U);
-  EXPECT_THAT(all_losses(*bag), HasSubstr("2 rows are left out"));
+  EXPECT_THAT(all_losses(*bag), HasSubstr("4 rows are left out"));
   EXPECT_THAT(all_losses(*bag), HasSubstr("1 messages on topic 99 are left out"));
-  EXPECT_THAT(all_losses(*bag), HasSubstr("1 row numbers between 1 and 9 are not there"));
+  EXPECT_THAT(all_losses(*bag), HasSubstr("1 row numbers between 1 and 11 are not there"));
 }
 
 TEST_F(Bag, NamesWithOddCharactersAreOpened) {

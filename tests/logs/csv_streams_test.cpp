@@ -105,5 +105,28 @@ TEST_F(MergedCsv, DefectsAreStillToldWithTheirLine) {
               HasSubstr("log.csv:102: column 'tau_r': 'torque'"));
 }
 
+TEST_F(MergedCsv, ATimeThatNanosecondsCannotTellIsRefused) {
+  std::string text = "t,omega_r,x\n";
+  for (int k = 0; k < 30; ++k) {
+    text += fmt::format("{},2,{}\n", k == 11 ? 1e10 : 0.02 * k, k % 3 == 0 ? "3" : "");
+  }
+  EXPECT_THAT(testing::input_error([&] { read(text); }), HasSubstr("log.csv:13: time 10000000000 s"));
+  std::string apart = "t,omega_r,x\n";
+  for (int k = 0; k < 61; ++k) {
+    apart += fmt::format("{},2,{}\n", 4e9 * (k / 30.0 - 1.0), k % 3 == 0 ? "3" : "");
+  }
+  EXPECT_EQ(read(apart).rows() + report.uncovered.count, 61U) << "steps of years are none that overflow";
+}
+
+TEST_F(MergedCsv, AnInfiniteSampleIsNoneAndNothingIsInterpolatedToIt) {
+  std::string text = "t,omega_r,x\n";
+  for (int k = 0; k < 100; ++k) {
+    text += fmt::format("{},2,{}\n", 0.02 * k, k == 60 ? "1e999" : k % 3 == 0 ? "3" : "");
+  }
+  const LogTable table = read(text);
+  EXPECT_EQ(table.rows(), 100U);
+  EXPECT_THAT(table.column("x"), ::testing::Each(3.0));
+}
+
 }  // namespace
 }  // namespace wheelwright::logs::csv_streams_test

@@ -215,6 +215,29 @@ TEST_F(Csv, CountsEveryRowThatItDrops) {
   EXPECT_FALSE(report.clean());
 }
 
+TEST_F(Csv, TheFirstTimeIsLookedAtLikeEveryOther) {
+  for (const std::string nothing : {"nan", "inf", " nan"}) {
+    const LogTable table = read("t,omega_r\n" + nothing + ",7\n" + rows_of(0, 20, ",1"));
+    EXPECT_EQ(table.rows(), 20u) << nothing;
+    EXPECT_EQ(table.t[0], 0.0);
+    EXPECT_EQ(report.not_finite.count, 1u);
+    EXPECT_THAT(report.not_finite.first, HasSubstr("log.csv:2, column t"));
+  }
+  EXPECT_EQ(read("t,omega_r\nnan,7\n" + rows_of(0, 30, "0000000,1").insert(0, "1700000000000000000,1\n")).t[0], 0.0)
+      << "a clock begins with the first time that is one";
+  for (const std::string far : {"1e30", " -1e12", "1e15"}) {
+    EXPECT_THAT(input_error([&] { read("t,omega_r\n" + far + ",7\n" + rows_of(0, 20, ",1")); }),
+                HasSubstr("log.csv:2: column 't'"));
+  }
+}
+
+TEST_F(Csv, CountsOfAClockAreSubtractedWithoutOverflow) {
+  const LogTable table =
+      read("t,omega_r\n1700000000000000000,1\n-9223372036854775808,1\n" + rows_of(0, 20, "00000000,1"));
+  EXPECT_NEAR(table.t[1], -9.223372036854775808e9 - 1.7e9, 1e-5);
+  EXPECT_EQ(report.resets.count, 1u);
+}
+
 TEST_F(Csv, DropsACutNumberAtTheEndOnly) {
   EXPECT_EQ(read("t,omega_r\n" + rows_of(0, 20, ",1") + "20,-").rows(), 20u);
   EXPECT_EQ(report.truncated.count, 1u);

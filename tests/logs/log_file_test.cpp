@@ -376,5 +376,27 @@ TEST_F(LogFile, DamagedHdf5IsReadOrRefused) {
   }
 }
 
+// The library would divide by 0.
+TEST_F(LogFile, ADatasetInChunksWithoutSizeIsRefused) {
+  std::string content = bytes(write("whole.h5", drive()));
+  const std::size_t layout = content.find(std::string("\x08\x00\x18\x00\x00\x00\x00\x00\x03\x02\x02", 11));
+  ASSERT_NE(layout, std::string::npos);
+  content.replace(layout + 8 + 3 + 8, 4, 4, '\0');  // behind version, dimensions, class and address
+  const auto file = put("damaged.h5", content);
+  EXPECT_THAT(input_error([&] { read({file}); }), HasSubstr("is stored in chunks with a side of 0"));
+}
+
+// The library would read what stands behind the attribute.
+TEST_F(LogFile, ADatasetWithDamagedAttributesIsRefused) {
+  const std::string content = bytes(write("whole.h5", drive()));
+  const std::size_t name = content.find("units");
+  ASSERT_NE(name, std::string::npos);
+  for (const std::string damage : {"\xf8\xff", "\xf8\xff\x8a\x97"}) {  // of the bytes of its dataspace, and of its name
+    std::string damaged = content;
+    const auto file = put("damaged.h5", damaged.replace(name - 2, damage.size(), damage));
+    EXPECT_THAT(input_error([&] { read({file}); }), HasSubstr("has an attribute that ends outside of itself"));
+  }
+}
+
 }  // namespace
 }  // namespace wheelwright::logs::log_file_test

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -162,6 +163,16 @@ TEST(StreamAligner, RefusesNonsense) {
   EXPECT_THROW(StreamAligner(1, {stream(1, 0)}), InvalidArgument) << "beyond the row";
   StreamAligner aligner(1, {stream(0, 0)});
   EXPECT_THROW(aligner.push(0, 0, {}), InvalidArgument);
+}
+
+TEST(StreamAligner, RefusesTimesWhoseDifferencesAreNoNumbers) {
+  StreamAligner aligner(2, {stream(0, ms), stream(1, ms)});
+  EXPECT_THROW(push(aligner, 0, std::numeric_limits<std::int64_t>::min(), 1.0), InvalidArgument);
+  EXPECT_THROW(push(aligner, 1, farthest_time, 1.0), InvalidArgument);
+  push(aligner, 1, -farthest_time + 1, 1.0);
+  push(aligner, 0, farthest_time - 1, 1.0);
+  push(aligner, 1, farthest_time - 1, 1.0);
+  EXPECT_EQ(drain(aligner).size(), 1U);
 }
 
 }  // namespace

@@ -127,6 +127,8 @@ TEST_F(RobotFiles, FilesThatAreNone) {
   EXPECT_THAT(input_error([&] { (void)read_robot(directory_); }), HasSubstr("is a directory"));
   EXPECT_THAT(input_error([&] { (void)read_robot(put("e.yaml", "")); }), HasSubstr("e.yaml: is empty"));
   EXPECT_THAT(input_error([&] { (void)read_robot(put("b.yaml", std::string("a\0b", 3))); }), HasSubstr("binary data"));
+  EXPECT_THAT(input_error([&] { (void)read_robot(put("u.yaml", "name: exam\xD7le\n" + least)); }),
+              HasSubstr("u.yaml:1: name: 'exam?le': expected"));
   EXPECT_THAT(input_error([&] { (void)read_robot(put("l.yaml", std::string(2000000, 'a'))); }),
               HasSubstr("longer than"));
 }

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What every fuzzer does: any bytes make a result or an InputError. Everything else that is thrown ends the fuzzer, as
+/// does what the sanitizers find.
+#pragma once
+
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include <wheelwright/core/error.hpp>
+
+namespace wheelwright::fuzz {
+
+/// The input as text.
+inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
+  return {reinterpret_cast<const char*>(data), size};
+}
+
+/// Calls `use`; an InputError is what bad input is to have.
+template <typename Use>
+int clean(const Use& use) {
+  try {
+    use();
+  } catch (const InputError&) {
+  }
+  return 0;
+}
+
+/// Ends the fuzzer where something that was promised does not hold.
+inline void require(bool holds) {
+  if (!holds) {
+    std::abort();
+  }
+}
+
+/// Calls `use`, which must not find what it reads bad.
+template <typename Use>
+void promised(const Use& use) {
+  try {
+    use();
+  } catch (const InputError& error) {
+    std::fputs(error.what(), stderr);
+    std::abort();
+  }
+}
+
+/// Puts `bytes` into a file of this process with that ending, and returns its path.
+inline std::filesystem::path on_disk(std::string_view bytes, const std::string& ending) {
+  const auto path =
+      std::filesystem::temp_directory_path() / ("wheelwright-fuzz-" + std::to_string(::getpid()) + ending);
+  std::filesystem::remove(path);  // a file that is new is not flushed to disk on closing
+  std::ofstream(path, std::ios::binary | std::ios::trunc)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  return path;
+}
+
+}  // namespace wheelwright::fuzz
+
+/// libFuzzer's entry point.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
