@@ -118,8 +118,9 @@ design::DesignSubject subject_of(const Arguments& a, const std::optional<OnlineM
   } catch (const InvalidArgument& error) {
     throw InputError(file + ": " + error.what() + limits);
   }
-  throw InputError(file +
-                   ": no limits: expected in the robot file, with values of your robot in place of these:" + limits);
+  throw InputError(
+      file +
+      ": no limits: expected in the robot file, each key once, with values of your robot in place of these:" + limits);
 }
 
 // NAME or NAME=SIZE of the catalogue; without any, the usual ones.

@@ -408,7 +408,7 @@ std::string little_learned(const Commissioning& result) {
   return text;
 }
 
-constexpr const char* kHowToDrive = "`wheelwright design --for bounds` plans a drive that shows more; commission that";
+constexpr const char* kHowToDrive = "`wheelwright design --for bounds` plans such a drive";
 
 std::string status_message(const Setting& s, const Commissioning& result) {
   std::string missing, todo;
@@ -423,10 +423,12 @@ std::string status_message(const Setting& s, const Commissioning& result) {
   switch (result.status) {
     case Commissioning::Status::done: {
       const std::string little = little_learned(result);
-      return (little.empty() ? "commissioned"
-                             : fmt::format("commissioned, but little was learned: {}; speed up and brake, drive curves "
-                                           "to both sides ({}), or declare smaller noise bounds where they hold",
-                                           little, kHowToDrive)) +
+      return (little.empty()
+                  ? "commissioned"
+                  : fmt::format("commissioned, but little was learned: {}; speed up and brake, drive curves "
+                                "to both sides ({}), and commission again, or declare smaller noise bounds where "
+                                "they hold",
+                                little, kHowToDrive)) +
              reservations(s, result);
     }
     case Commissioning::Status::partial: {

@@ -73,10 +73,10 @@ std::string noise_line(const Robot& robot) {
 }
 
 [[noreturn]] void not_enough_known(const std::string& of, const std::string& lines) {
-  throw InvalidArgument(
-      of +
-      " does not say enough to plan with: expected in the robot file, with values of your robot in place of these:" +
-      lines);
+  throw InvalidArgument(of +
+                        " does not say enough to plan with: expected in the robot file, each key once, with values of "
+                        "your robot in place of these:" +
+                        lines);
 }
 
 filter::SignalErrors worst_case_errors(const DesignSubject& subject, const Measurement& measurement,
