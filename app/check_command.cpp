@@ -41,7 +41,7 @@ constexpr const char* kExamples =
     "Exit code: 0 everything is proved, 1 something is not (it is said what and by how much), 2 bad input.";
 
 int run(const Arguments& a) {
-  make_directory(a.common);
+  make_directory(a.common, {"check.json"});
   const results::ModelClaims claims = results::read_claims(a.model);
   const auto opened = open_robot_log(a.logs, claims.robot, a.common);
   logs::RecordedLog& log = *opened;

@@ -129,7 +129,7 @@ int run(const Arguments& a) {
   for (const std::string& text : a.faults) {
     options.trial.faults.push_back(stated(text));
   }
-  make_directory(a.common);
+  make_directory(a.common, {"choice.json", "model.json"});
   Robot robot = read_robot(a.robot);
   const auto opened = open_robot_log(a.logs, robot, a.common);
   logs::RecordedLog& log = *opened;

@@ -52,7 +52,7 @@ constexpr const char* kExamples =
     "Exit code: 0 a model was made, 1 the log contradicts the model or shows no parameter, 2 bad input.";
 
 int run(const Arguments& a) {
-  make_directory(a.common);
+  make_directory(a.common, {"model.json"});
   Robot robot = read_robot(a.robot);
   const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::judged);
   logs::RecordedLog& log = *opened.log;
@@ -74,9 +74,7 @@ int run(const Arguments& a) {
       context.seen = commission::first_look(log, result.model);
     }
   } catch (const Error& error) {
-    if (!a.common.out.empty()) {
-      files::atomic_write(a.common.out / "report.html", report::failure_report(error.what(), context));
-    }
+    write_page(a.common, report::failure_report(error.what(), context));
     throw;
   }
   Json model = results::to_json(result, log.report(), results::software());

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <iostream>
+#include <mutex>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -89,10 +92,69 @@ std::vector<std::filesystem::path>& made_directories() {
   return made;
 }
 
+std::mutex& made_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+constexpr std::string_view kPage = "report.html";
+constexpr std::string_view kHead = "<head>\n";
+constexpr std::chrono::seconds kOneRun(10);  // between files that one run writes, when a directory is copied, too
+
+constexpr std::string_view kGenerator = "<meta name=\"generator\" content=\"wheelwright ";
+
+// Pipes, devices and what the program was started with ("/dev/stdout") are written to, whatever is there.
+bool is_there(const std::filesystem::path& out) {
+  std::error_code none;
+  const std::filesystem::file_status there = std::filesystem::status(out, none);
+  const bool own_stream =
+      out.parent_path() == "/dev/fd" || std::filesystem::read_symlink(out, none).native().starts_with("/proc/self/fd/");
+  return std::filesystem::exists(there) && !std::filesystem::is_other(there) && !own_stream;
+}
+
+std::string beginning(const std::filesystem::path& file) {
+  constexpr std::streamsize kMarked = 1024;
+  std::string text(kMarked, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(text.data(), kMarked);
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+// Empty where this command may replace the file `name` of its results, the first of which is `result`; else whose the
+// file is.
+std::string whose(const CommonOptions& options, const std::string& result, const std::string& name) {
+  const std::filesystem::path place = options.out / name;
+  const std::string text = beginning(place);
+  const std::string command = "`wheelwright " + options.command + "`";
+  if (name == kPage) {
+    if (const std::size_t at = text.find(kGenerator); at != std::string::npos) {
+      const std::size_t from = at + kGenerator.size();
+      const std::string of = text.substr(from, text.find('"', from) - from);
+      return of == options.command ? "" : "the page of `wheelwright " + of + "`";
+    }
+  }
+  const auto made_here = [&](const std::string& of_result) {
+    const std::string kind = std::filesystem::path(result).stem().string();
+    return of_result.find("\"schema\": \"wheelwright/" + kind + "/") != std::string::npos;
+  };
+  if (name == result) {
+    return made_here(text) ? "" : "no result of " + command;
+  }
+  if (!made_here(beginning(options.out / result))) {
+    return "not written by " + command;
+  }
+  std::error_code error;
+  const auto of_result = std::filesystem::last_write_time(options.out / result, error);
+  return std::filesystem::last_write_time(place, error) > of_result + kOneRun ? "changed since " + command + " wrote it"
+                                                                              : "";
+}
+
 }  // namespace
 
 void remove_empty_directories() {
   std::error_code none;
+  const std::lock_guard<std::mutex> lock(made_mutex());
   for (const std::filesystem::path& made : made_directories()) {
     if (std::filesystem::is_directory(made, none)) {
       std::filesystem::remove(made, none);  // fails where something is in it
@@ -100,10 +162,8 @@ void remove_empty_directories() {
   }
 }
 
-void keep_existing(const std::filesystem::path& out) {
-  std::error_code ignored;
-  const std::filesystem::file_status there = std::filesystem::status(out, ignored);
-  if (std::filesystem::exists(there) && !std::filesystem::is_other(there)) {
+void keep_existing(const CommonOptions& options, const std::filesystem::path& out, std::string_view mark) {
+  if (!options.force && is_there(out) && (mark.empty() || beginning(out).find(mark) == std::string::npos)) {
     throw InputError(out.string() + ": is there already: expected a new name, or --force");
   }
 }
@@ -117,10 +177,23 @@ void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesy
   }
 }
 
-void make_directory(const CommonOptions& options) {
+void make_directory(const CommonOptions& options, const std::vector<std::string>& files) {
   if (options.out.empty()) {
     return;
   }
+  std::vector<std::string> names = files;
+  if (!names.empty()) {
+    names.emplace_back(kPage);
+  }
+  for (const std::string& name : names) {
+    if (const std::filesystem::path place = options.out / name; is_there(place) && !options.force) {
+      if (const std::string other = whose(options, files.front(), name); !other.empty()) {
+        throw InputError(fmt::format("{}: is there already, {}: expected another --out, or --force to replace it",
+                                     place.string(), other));
+      }
+    }
+  }
+  const std::lock_guard<std::mutex> lock(made_mutex());
   std::error_code error;
   std::vector<std::filesystem::path>& made = made_directories();
   for (std::filesystem::path at = options.out; !at.empty() && !std::filesystem::exists(at, error);
@@ -135,9 +208,18 @@ void make_directory(const CommonOptions& options) {
   }
 }
 
+void write_page(const CommonOptions& options, std::string page) {
+  if (!options.out.empty()) {
+    if (const std::size_t head = page.find(kHead); head != std::string::npos) {
+      page.insert(head + kHead.size(), fmt::format("{}{}\">\n", kGenerator, options.command));
+    }
+    files::atomic_write(options.out / kPage, page);
+  }
+}
+
 void publish(const CommonOptions& options, const Json& result, const std::string& name, const std::string& report) {
   if (!options.out.empty()) {
-    files::atomic_write(options.out / "report.html", report);
+    write_page(options, report);
     files::write_json(options.out / name, result);
   }
   if (options.json) {

@@ -41,7 +41,9 @@ enum ExitCode : int {
 
 /// Options that every command has.
 struct CommonOptions {
+  std::string command;                          ///< its name
   std::filesystem::path out;                    ///< directory of results; empty: none
+  bool force = false;                           ///< what is in the way of results is replaced, whose it may be
   bool json = false;                            ///< the result on standard output, and nothing else there
   bool quiet = false;                           ///< no progress, no summary
   int threads = 1;                              ///< most threads; by default the machine's (add_common())
@@ -85,16 +87,23 @@ void tell(fmt::format_string<Values...> text, Values&&... values) {
 [[nodiscard]] std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths,
                                                                 const Robot& robot, const CommonOptions& options);
 
-/// Throws InputError where a file `out` is there already; pipes and devices are written to.
-void keep_existing(const std::filesystem::path& out);
+/// Throws InputError where a file `out` is there already, unless --force is given or the file begins (its first KiB)
+/// with a text that holds `mark`, which what the command itself writes there has. Pipes and devices are written to.
+void keep_existing(const CommonOptions& options, const std::filesystem::path& out, std::string_view mark = {});
 
 /// Throws InputError where writing `out` would replace one of the files `read`.
 void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesystem::path>& read);
 
-/// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible.
-void make_directory(const CommonOptions& options);
+/// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible, and, unless --force
+/// is given, where something else would be replaced than the command's own earlier result. `files` are the names that
+/// it writes beside report.html: first the result, KIND.json of the schema wheelwright/KIND, by which it knows itself,
+/// then what else it writes, which is its own where it is not younger than that.
+void make_directory(const CommonOptions& options, const std::vector<std::string>& files = {});
 /// Removes what make_directory() made and nothing was put into: a run that failed leaves no empty directories.
 void remove_empty_directories();
+
+/// Writes out/report.html where a directory is wanted, with the name of the command in its head.
+void write_page(const CommonOptions& options, std::string page);
 
 /// Writes `result` to out/name and report to out/report.html where a directory is wanted, and the result to standard
 /// output with --json.
@@ -114,9 +123,7 @@ auto or_failure_page(const CommonOptions& options, const report::ReportContext& 
   try {
     return work();
   } catch (const Error& error) {
-    if (!options.out.empty()) {
-      files::atomic_write(options.out / "report.html", report::failure_report(error.what(), context));
-    }
+    write_page(options, report::failure_report(error.what(), context));
     throw;
   }
 }

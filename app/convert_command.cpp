@@ -20,7 +20,6 @@ namespace {
 struct Arguments {
   std::vector<std::filesystem::path> paths;
   logs::McapCompression compression = logs::McapCompression::zstd;
-  bool force = false;
   CommonOptions common;
 };
 
@@ -40,9 +39,7 @@ int run(const Arguments& a) {
   std::vector<std::filesystem::path> from = a.paths;
   const std::filesystem::path to = from.back();
   from.pop_back();
-  if (!a.force) {
-    keep_existing(to);
-  }
+  keep_existing(a.common, to);
   const std::unique_ptr<logs::RecordedLog> log = logs::open_log(from, reader_options(a.common));
   const logs::LogReport& report = log->report();
   logs::LogWriteOptions options;
@@ -98,7 +95,6 @@ Run add_convert(CLI::App& program) {
                                                                                {"lz4", logs::McapCompression::lz4}})
               .description("{none,zstd,lz4}"))
       ->type_name("KIND");
-  command.add_flag("--force", a->force, "Replace what is there");
   add_map(command, a->common);
   return finish(command, a, kExamples, run);
 }

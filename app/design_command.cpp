@@ -87,15 +87,40 @@ design::MotionLimits limits_from(const Arguments& a, const Robot& robot) {
   if (!a.box.empty()) {
     limits.box = {Interval{a.box[0], a.box[1]}, Interval{a.box[2], a.box[3]}};
   }
-  if (limits.joint_speed <= 0.0) {
-    throw InputError("no limit on the speed: expected --speed, or limits: {speed: …} in the robot file (rad/s)");
-  }
-  if (!limits.joint_acceleration && !limits.effort) {
-    throw InputError(
-        "no limit on acceleration or effort: expected --acceleration or --effort, or limits: {acceleration: …, effort: "
-        "…} in the robot file");
-  }
   return limits;
+}
+
+// What is missing of the limits, as a line of the robot file; empty where nothing is.
+std::string missing_limits(const Arguments& a, const Robot& robot) {
+  const design::MotionLimits own = design::limits_of(robot);
+  const bool speed = a.speed || own.joint_speed > 0.0;
+  const bool force = a.acceleration || a.effort || own.joint_acceleration || own.effort;
+  if (speed && force) {
+    return "";
+  }
+  return fmt::format("\n  limits: {{{}{}{}}}  # of a wheel: {}{}{}; or {}{}{}", speed ? "" : "speed: 8",
+                     speed || force ? "" : ", ", force ? "" : "acceleration: 20", speed ? "" : "rad/s",
+                     speed || force ? "" : ", ", force ? "" : "rad/s² (or effort, in the unit of the efforts)",
+                     speed ? "" : "--speed", speed || force ? "" : " and ",
+                     force ? "" : "--acceleration (or --effort)");
+}
+
+// What is planned for; what the robot file lacks is told all at once.
+design::DesignSubject subject_of(const Arguments& a, const std::optional<OnlineModel>& model) {
+  const Robot robot = model ? model->robot : read_robot(a.robot);
+  const std::string limits = missing_limits(a, robot);
+  const std::string file = (model ? a.model : a.robot).string();
+  try {
+    const design::DesignSubject subject = model ? design::subject_of(*model) : design::subject_of(robot, 1.0 / a.rate);
+    if (limits.empty()) {
+      return subject;
+    }
+  } catch (const InvalidArgument& error) {
+    throw InputError(file + ": " + error.what() + limits);
+  }
+  throw InputError(
+      file +
+      ": no limits: expected in the robot file, each key once, with values of your robot in place of these:" + limits);
 }
 
 // NAME or NAME=SIZE of the catalogue; without any, the usual ones.
@@ -189,16 +214,19 @@ int run(const Arguments& a) {
     throw InputError("--guarantee at-risk: expected --for bounds or detection; telling causes apart is statistical");
   }
   check_rivals(a);
-  make_directory(a.common);
+  make_directory(a.common, {"design.json", "manoeuvre.csv", "figure_eight.csv"});
   const std::optional<OnlineModel> model = a.model.empty() ? std::nullopt : std::optional(read_model(a.model));
-  const design::DesignSubject subject =
-      model ? design::subject_of(*model) : design::subject_of(read_robot(a.robot), 1.0 / a.rate);
+  design::DesignSubject subject = subject_of(a, model);
   if (a.guarantee == design::Promise::at_risk && !subject.averaging) {
     throw InputError(
         "--guarantee at-risk: no errors are known to average out: expected noise: {effort: {bound: …, bias: …}} in the "
         "robot file, or a model that says something at a stated risk (docs/risk.md)");
   }
-  const design::MotionLimits limits = limits_from(a, subject.robot);
+  design::MotionLimits limits = limits_from(a, subject.robot);
+  if (a.aim == "discrimination") {
+    limits = gap::limits_in_torques(limits, subject);
+    subject = gap::in_torques(subject);
+  }
   Progress progress(a.common.quiet);
   design::DesignOptions options;
   options.guarantee = a.guarantee;

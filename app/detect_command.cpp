@@ -83,7 +83,8 @@ int run(const Arguments& a) {
     throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
   }
   keep_inputs(a.series, {a.log, a.model});
-  make_directory(a.common);
+  keep_existing(a.common, a.series);
+  make_directory(a.common, {"detection.json"});
   const auto opened = logs::open_log({a.log}, reader);
   logs::RecordedLog& log = *opened;
   const report::ReportContext context = report_context(a.common, log.report(), log);

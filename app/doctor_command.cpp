@@ -96,7 +96,7 @@ void tell(const doctor::LogHealth& health, bool all) {
 }
 
 int run(const Arguments& a) {
-  make_directory(a.common);
+  make_directory(a.common, {"doctor.json"});
   const std::optional<Robot> robot = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
   const auto opened = logs::open_log(a.logs, robot ? robot_reader(*robot, a.common) : reader_options(a.common));
   logs::RecordedLog& log = *opened;

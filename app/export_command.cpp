@@ -92,6 +92,7 @@ int run(const Arguments& a) {
   if (!a.common.out.empty()) {
     make_directory(a.common);
     file = (a.common.out / (a.name + ".h")).string();
+    keep_existing(a.common, file, fmt::format("/* {}.h: on-line fault detector.", a.name));
     files::atomic_write(file, text);
   }
   if (a.common.json) {

@@ -186,7 +186,7 @@ void tell_failures(const study::FleetResult& fleet) {
 }
 
 int run(const Arguments& a) {
-  make_directory(a.common);
+  make_directory(a.common, {"fleet.json", "fleet.csv", "pooled_prior.yaml"});
   (void)reader_options(a.common);  // what is wrong with --map is wrong for every log
   const std::vector<robots::FleetListRobot> robots = robots::read_fleet(a.list);
   const std::optional<Robot> own = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));

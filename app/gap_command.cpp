@@ -156,16 +156,16 @@ void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& 
   }
 }
 
+// Name of an edited file in the directory of results: robot_improved.xml of robot.xml.
+std::string edited_name(const std::filesystem::path& source) {
+  return source.stem().string() + "_improved" + source.extension().string();
+}
+
 // A file of the user's simulator.
 struct SimulatorSource {
   robots::SimulatorFormat format = robots::SimulatorFormat::mjcf;
   std::filesystem::path path;
   std::string text;
-
-  // Name of the edited file in the directory of results: robot_improved.xml of robot.xml.
-  [[nodiscard]] std::string edited_name() const {
-    return path.stem().string() + "_improved" + path.extension().string();
-  }
 };
 
 // Files that are to be edited; what is wrong with them is told before the work begins.
@@ -186,13 +186,13 @@ std::vector<SimulatorSource> simulator_sources(const Arguments& a, const Robot& 
     }
     SimulatorSource source{format, path, files::read_bytes(path, kLongest)};
     std::error_code none;
-    const std::filesystem::path target = a.common.out / source.edited_name();
+    const std::filesystem::path target = a.common.out / edited_name(source.path);
     if (std::filesystem::equivalent(path, target, none)) {
       throw InputError(
           fmt::format("{} {}: would be written over itself: expected another --out", option, path.string()));
     }
     for (const SimulatorSource& other : sources) {
-      if (other.edited_name() == source.edited_name()) {
+      if (edited_name(other.path) == edited_name(source.path)) {
         throw InputError(fmt::format("{} {}: {} has the same name: expected one file for each", option, path.string(),
                                      other.path.string()));
       }
@@ -230,7 +230,7 @@ std::vector<robots::EditedSimulator> write_simulators(const Arguments& a, const 
   for (const SimulatorSource& source : sources) {
     edits.push_back(robots::edit_simulator(source.format, source.text, source.path.string(), change, robot, a.wheels));
     const robots::EditedSimulator& edit = edits.back();
-    const std::string name = source.edited_name();
+    const std::string name = edited_name(source.path);
     if (edit.changed.empty()) {
       std::filesystem::remove(a.common.out / name);
     } else {
@@ -249,7 +249,7 @@ void say_simulators(const Arguments& a, const std::vector<SimulatorSource>& sour
     if (edit.changed.empty()) {
       say("{}: nothing to change\n", sources[k].path.string());
     } else {
-      say("wrote {}, which is {} but for:\n", (a.common.out / sources[k].edited_name()).string(),
+      say("wrote {}, which is {} but for:\n", (a.common.out / edited_name(sources[k].path)).string(),
           sources[k].path.string());
     }
     for (const robots::NumberChanged& c : edit.changed) {
@@ -266,7 +266,13 @@ void say_simulators(const Arguments& a, const std::vector<SimulatorSource>& sour
 }
 
 int run(const Arguments& a) {
-  make_directory(a.common);
+  std::vector<std::string> written = {"gap.json", kImproved, kNext, kResiduals};
+  for (const std::filesystem::path& simulator : a.simulators) {
+    if (!simulator.empty()) {
+      written.push_back(edited_name(simulator));
+    }
+  }
+  make_directory(a.common, written);
   Robot robot = read_robot(a.robot);
   const std::vector<SimulatorSource> sources = simulator_sources(a, robot);
   const std::vector<Effect> catalogue = gap::effect_catalogue(model::make_model(robot));
@@ -311,9 +317,7 @@ int run(const Arguments& a) {
       change = change_of(log, healthy, robot, diagnosis, options);
     }
   } catch (const Error& error) {
-    if (!a.common.out.empty()) {
-      files::atomic_write(a.common.out / "report.html", report::failure_report(error.what(), context));
-    }
+    write_page(a.common, report::failure_report(error.what(), context));
     throw;
   }
   for (std::vector<std::string>* texts : {&diagnosis.notes, &diagnosis.not_excited}) {

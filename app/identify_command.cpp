@@ -58,7 +58,7 @@ bool for_kinematics_only(const LogSource& log, const Robot& robot) {
 }
 
 int run(const Arguments& a) {
-  make_directory(a.common);
+  make_directory(a.common, {"identification.json"});
   Robot robot = read_robot(a.robot);
   const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::hidden);
   logs::RecordedLog& log = *opened.log;

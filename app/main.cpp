@@ -58,6 +58,7 @@ void end_when_interrupted() {
     int signal = 0;
     if (sigwait(&signals, &signal) == 0) {
       wheelwright::files::remove_temporaries();
+      remove_empty_directories();
       _exit(128 + signal);
     }
   }).detach();
@@ -110,7 +111,6 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? kDone : kBadInput;
   } catch (const wheelwright::Error& error) {
-    remove_empty_directories();
     tell("wheelwright: {}\n", error.what());
     return kBadInput;
   } catch (const std::bad_alloc&) {
@@ -126,5 +126,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   end_when_interrupted();
-  return finished(run(argc, argv));
+  const int code = run(argc, argv);
+  remove_empty_directories();
+  return finished(code);
 }

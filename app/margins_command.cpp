@@ -96,7 +96,7 @@ std::string risk_table(const commission::MarginSurvey& survey) {
 
 int run(const Arguments& a) {
   const OnlineModel model = read_model(a.model);
-  make_directory(a.common);
+  make_directory(a.common, {"margins.json"});
   const auto opened = open_robot_log({a.log}, model.robot, a.common);
   logs::RecordedLog& log = *opened;
   const report::ReportContext context = report_context(a.common, log.report(), log);

@@ -21,7 +21,9 @@ constexpr int kMostThreads = 1024;
 }  // namespace
 
 void add_common(CLI::App& command, CommonOptions& options) {
+  options.command = command.get_name();
   command.add_option("--out", options.out, "Write results and report.html into this directory")->type_name("DIR");
+  command.add_flag("--force", options.force, "Replace what is there, also what another command or you wrote");
   command.add_flag("--json", options.json, "Print the result as JSON on standard output, and nothing else there");
   // Of the processors that this process may use, so that ranks that are bound to one have one.
   options.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMostThreads);

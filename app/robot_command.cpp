@@ -24,7 +24,6 @@ struct Arguments {
   std::filesystem::path urdf, ros2_control, file;
   std::string controller;
   robots::RobotHints hints;
-  bool force = false;
   CommonOptions common;
 };
 
@@ -64,9 +63,7 @@ int run(const Arguments& a) {
     throw InputError("--out-file and --out: two places for one file: expected one of them");
   }
   const std::filesystem::path target = a.common.out.empty() ? a.file : a.common.out / "robot.yaml";
-  if (!a.force) {
-    keep_existing(target);
-  }
+  keep_existing(a.common, target);
   const robots::RobotWithOrigins robot = made(a);
   const std::string text = robots::robot_yaml(robot);
   static_cast<void>(robots::parse_robot(text, target.empty() ? "the robot file" : target.string()));
@@ -104,7 +101,6 @@ Run add_robot(CLI::App& program) {
   command.add_option("--controller", a->controller, "Name of the controller, where the file has several")
       ->type_name("NAME");
   command.add_option("--out-file", a->file, "The robot file to write; without it, standard output")->type_name("FILE");
-  command.add_flag("--force", a->force, "Write over a file that is there");
   for (const auto& [name, joints, side] :
        {std::tuple{"--left", &a->hints.left, "left"}, {"--right", &a->hints.right, "right"}}) {
     command.add_option(name, *joints, fmt::format("Joint of the driven wheel on the {} side", side))

@@ -131,7 +131,7 @@ std::optional<study::LocalSensitivity> derivatives(const study::Study& study, st
 }
 
 int run(const Arguments& a) {
-  make_directory(a.common);
+  make_directory(a.common, {"sensitivity.json"});
   results::StudyFile file = results::read_study(a.study);
   const study::Study& study = file.study;
   const study::StudyDesign design = study::design_of(study);

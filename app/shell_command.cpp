@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the program says of itself: completion scripts and manual pages.
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -39,16 +41,21 @@ constexpr const char* kManExamples =
 
 struct ManArguments {
   std::string command;
-  std::filesystem::path out;
+  CommonOptions common;
 };
 
-int write_pages(const ProgramWords& words, const std::filesystem::path& out) {
-  CommonOptions where;
-  where.out = out;
-  make_directory(where);
-  files::atomic_write(out / "wheelwright.1", manual_page(words, results::software()));
+int write_pages(const ProgramWords& words, const CommonOptions& options) {
+  std::vector<std::pair<std::filesystem::path, std::string>> pages = {
+      {options.out / "wheelwright.1", manual_page(words, results::software())}};
   for (const CommandWords& command : words.commands) {
-    files::atomic_write(out / ("wheelwright-" + command.name + ".1"), manual_page(command, results::software()));
+    pages.emplace_back(options.out / ("wheelwright-" + command.name + ".1"), manual_page(command, results::software()));
+  }
+  for (const auto& [place, page] : pages) {
+    keep_existing(options, place, ".TH WHEELWRIGHT");
+  }
+  make_directory(options);
+  for (const auto& [place, page] : pages) {
+    files::atomic_write(place, page);
   }
   return kDone;
 }
@@ -70,12 +77,13 @@ Run add_man(CLI::App& program) {
   auto a = std::make_shared<ManArguments>();
   CLI::App& command = *program.add_subcommand("man", kManHelp);
   command.add_option("COMMAND", a->command, "The command; without it, the program");
-  command.add_option("--out", a->out, "Write all pages into this directory")->type_name("DIR");
+  command.add_option("--out", a->common.out, "Write all pages into this directory")->type_name("DIR");
+  command.add_flag("--force", a->common.force, "Replace what is there and no manual page of wheelwright");
   add_footer(command, kManExamples);
   return [a, &program](const std::string&) {
     const ProgramWords words = words_of(program);
-    if (!a->out.empty()) {
-      return write_pages(words, a->out);
+    if (!a->common.out.empty()) {
+      return write_pages(words, a->common);
     }
     const CommandWords* one = words.find(a->command);
     if (one == nullptr && !a->command.empty()) {

@@ -19,11 +19,8 @@ namespace {
 
 struct Arguments {
   std::filesystem::path scenario;
-  std::filesystem::path out;
   std::optional<std::uint64_t> seed;
-  int threads = 1;
-  bool json = false;
-  bool quiet = false;
+  CommonOptions common;
 };
 
 constexpr const char* kHelp =
@@ -36,13 +33,14 @@ constexpr const char* kExamples =
     "  wheelwright simulate examples/scenarios/wheel_radius_fault.yaml --out fault.csv.gz --seed 7";
 
 int run(const Arguments& a) {
-  keep_inputs(a.out, {a.scenario});
+  keep_inputs(a.common.out, {a.scenario});
+  keep_existing(a.common, a.common.out);
   Scenario scenario = read_scenario(a.scenario);
   if (a.seed) {
     scenario.seed = *a.seed;
   }
   Simulation simulation(scenario);
-  const auto writer = logs::create_csv(a.out, simulation.columns());
+  const auto writer = logs::create_csv(a.common.out, simulation.columns());
   LogBlock block;
   std::size_t rows = 0;
   while (simulation.next(block)) {
@@ -50,15 +48,15 @@ int run(const Arguments& a) {
     rows += block.rows();
   }
   writer->commit();
-  if (a.json) {
+  if (a.common.json) {
     say_json({{"schema", "wheelwright/simulation/1"},
               {"software", results::software()},
               {"scenario", a.scenario.string()},
-              {"log", a.out.string()},
+              {"log", a.common.out.string()},
               {"rows", rows},
               {"seed", scenario.seed}});
-  } else if (!a.quiet) {
-    say("wrote {}: {} rows, {:.1f} s, seed {}\n", a.out.string(), rows, scenario.duration, scenario.seed);
+  } else if (!a.common.quiet) {
+    say("wrote {}: {} rows, {:.1f} s, seed {}\n", a.common.out.string(), rows, scenario.duration, scenario.seed);
   }
   return kDone;
 }
@@ -71,13 +69,16 @@ Run add_simulate(CLI::App& program) {
   auto a = std::make_shared<Arguments>();
   CLI::App& command = *program.add_subcommand("simulate", kHelp);
   command.add_option("SCENARIO", a->scenario, "Scenario file (YAML)")->required();
-  command.add_option("--out", a->out, "The log to write: .csv, .csv.gz or .csv.zst")->required()->type_name("LOG");
+  command.add_option("--out", a->common.out, "The log to write: .csv, .csv.gz or .csv.zst")
+      ->required()
+      ->type_name("LOG");
   command.add_option("--seed", a->seed, "Seed of all noise, in place of the scenario's")->type_name("N");
-  command.add_option("--threads", a->threads, "Accepted for all commands; a drive is one thread")
+  command.add_option("--threads", a->common.threads, "Accepted for all commands; a drive is one thread")
       ->type_name("N")
       ->check(CLI::Range(1, 1024));
-  command.add_flag("--json", a->json, "Say what was written as JSON");
-  command.add_flag("--quiet", a->quiet, "Say nothing");
+  command.add_flag("--force", a->common.force, "Replace a log that is there");
+  command.add_flag("--json", a->common.json, "Say what was written as JSON");
+  command.add_flag("--quiet", a->common.quiet, "Say nothing");
   command.footer(kExamples);
   return [a](const std::string&) { return run(*a); };
 }

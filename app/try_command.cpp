@@ -331,7 +331,7 @@ int run(const Arguments& given) {
   took.push_back(fmt::format("columns of the log: {}", core::listed(log->columns())));
   const std::vector<std::string> read = logs::sentences(log->report());
   took.insert(took.end(), read.begin(), read.end());
-  make_directory(a.common);
+  make_directory(a.common, {"try.json", "robot.yaml"});
   if (!yaml.empty()) {
     static_cast<void>(robots::parse_robot(yaml, file.string()));
     files::atomic_write(file, yaml);
@@ -349,8 +349,10 @@ int run(const Arguments& given) {
     for (const std::filesystem::path& path : a.common.msg_path) {
       line.insert(line.end(), {"--msg-path", path.string()});
     }
-    if (a.common.trust) {
-      line.emplace_back("--trust");
+    for (const auto& [wanted, option] : {std::pair(a.common.trust, "--trust"), {a.common.force, "--force"}}) {
+      if (wanted) {
+        line.emplace_back(option);
+      }
     }
     line.insert(line.end(), {"--out", (out / command).string(), "--quiet", "--threads",
                              std::to_string(a.common.threads), "--seed", std::to_string(a.common.seed)});

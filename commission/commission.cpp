@@ -398,6 +398,32 @@ bool withdrawn(const Commissioning& result) {
   return std::ranges::any_of(result.contradictions, [](const LogContradiction& c) { return c.withdraws; });
 }
 
+// What makes a model that came out one of little use; empty where nothing does.
+std::string little_learned(const Commissioning& result) {
+  constexpr double kUseless = 1.0;  // |κ|: the fault is as large as the effort
+  std::string text, open;
+  const bool tried = std::ranges::any_of(result.validation, [](const OutputValidation& v) { return v.instants > 0; });
+  const bool sees = std::ranges::any_of(result.validation, [](const OutputValidation& v) {
+    return v.instants > 0 && v.smallest_kappa > 0.0 && v.smallest_kappa <= kUseless;
+  });
+  if (tried && !sees) {
+    text =
+        "no fault that scales the effort is certain to be seen on driving like this, since thresholds are as wide as "
+        "the efforts";
+  }
+  for (const ParameterResult& p : result.parameters) {
+    if (p.lower_is_prior && p.upper_is_prior && p.excitation != identify::Excitation::not_excited) {
+      open += (open.empty() ? "" : ", ") + p.parameter.name;
+    }
+  }
+  if (!open.empty()) {
+    text += fmt::format("{}bounds of {} are still those of the prior", text.empty() ? "" : ", and the ", open);
+  }
+  return text;
+}
+
+constexpr const char* kHowToDrive = "`wheelwright design --for bounds` plans such a drive";
+
 std::string status_message(const Setting& s, const Commissioning& result) {
   std::string missing, todo;
   for (const ParameterResult& p : result.parameters) {
@@ -409,10 +435,24 @@ std::string status_message(const Setting& s, const Commissioning& result) {
     }
   }
   switch (result.status) {
-    case Commissioning::Status::done: return "commissioned" + reservations(s, result);
-    case Commissioning::Status::partial:
-      return "commissioned, but the log says nothing about " + missing + ": " + todo +
-             ", and commission again; until then their bounds are those of the prior" + reservations(s, result);
+    case Commissioning::Status::done: {
+      const std::string little = little_learned(result);
+      return (little.empty()
+                  ? "commissioned"
+                  : fmt::format("commissioned, but little was learned: {}; speed up and brake, drive curves "
+                                "to both sides ({}), and commission again, or declare smaller noise bounds where "
+                                "they hold",
+                                little, kHowToDrive)) +
+             reservations(s, result);
+    }
+    case Commissioning::Status::partial: {
+      const std::string little = little_learned(result);
+      return fmt::format(
+                 "commissioned, but {}the log says nothing about {}: {}, and commission again ({}); until then "
+                 "their bounds are those of the prior",
+                 little.empty() ? "" : "little was learned: " + little + "; ", missing, todo, kHowToDrive) +
+             reservations(s, result);
+    }
     case Commissioning::Status::nothing: return "the log says nothing about any parameter: " + todo;
     case Commissioning::Status::empty: {
       const std::string why = withdrawal(result), prior = default_prior_in_the_way(s, result);
@@ -530,8 +570,8 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   }
   if (withdrawn(result)) {
     withdraw(result);
-    result.message = status_message(s, result);
   }
+  result.message = status_message(s, result);
   log.rewind();
   tell(options, "done", 1.0);
   return result;

@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include <wheelwright/commission/noise_budget.hpp>
 #include <wheelwright/commission/physical.hpp>
@@ -28,9 +31,52 @@ std::optional<double> nominal_parameter(const Robot& robot, const Model& model, 
   return (found->second + (*scales)[j].offset) / (*scales)[j].scale;
 }
 
-[[noreturn]] void nothing_known(const model::Parameter& parameter) {
-  throw InvalidArgument("nothing is known of " + parameter.physical + ": expected nominal: {" + parameter.physical +
-                        ": VALUE} in the robot file (" + parameter.physical_unit + "; a rough value will do)");
+// Of a robot of some 20 kg, for a user to replace.
+double example_value(const std::string& unit) {
+  constexpr std::pair<const char*, double> kValues[] = {{"kg", 20.0},       {"kg·m²", 0.8}, {"N·s/m", 4.0},
+                                                        {"N·m·s/rad", 0.5}, {"N·m", 0.3},   {"N", 3.0}};
+  const auto found = std::ranges::find(kValues, unit, &std::pair<const char*, double>::first);
+  return found == std::end(kValues) ? 1.0 : found->second;
+}
+
+// The line of a robot file that says what is `unknown`, as far as planning needs it; empty where nothing is.
+std::string nominal_line(const Robot& robot, const Model& model, const std::vector<std::size_t>& unknown) {
+  std::string values, units;
+  for (const std::size_t j : unknown) {
+    const model::Parameter& parameter = model.parameters[j];
+    if (!robot.nominal.contains(parameter.physical)) {
+      values += fmt::format("{}{}: {}", values.empty() ? "" : ", ", parameter.physical,
+                            example_value(parameter.physical_unit));
+      units += (units.empty() ? "" : ", ") + parameter.physical_unit;
+    }
+  }
+  return values.empty() ? "" : fmt::format("\n  nominal: {{{}}}  # {}; rough values will do", values, units);
+}
+
+// The same of the motor's constants.
+std::string motor_line(const Robot& robot, const Model& model) {
+  if (commission::physical_scales(robot, model)) {
+    return "";
+  }
+  const bool voltage = robot.effort == model::EffortKind::voltage;
+  return fmt::format(
+      "\n  motor: {{torque_constant: 0.05, gear_ratio: 30{}}}  # N·m/A at the motor's shaft, turns of it for one of "
+      "the wheel{}: efforts are in {}, nominal values are not",
+      voltage ? ", resistance: 1.2, back_emf: 0.05" : "", voltage ? ", Ω, V·s/rad" : "", voltage ? "V" : "A");
+}
+
+std::string noise_line(const Robot& robot) {
+  const bool wheels = model::on_two_wheels(robot);
+  return fmt::format("\n  noise: {{{}, effort: 0.05}}  # bounds of the sensors' errors: {}, {}",
+                     wheels ? "wheel_speed: 0.02" : "position: 0.001", wheels ? "rad/s" : "m (rotary: rad)",
+                     commission::output_unit(robot, "N·m"));
+}
+
+[[noreturn]] void not_enough_known(const std::string& of, const std::string& lines) {
+  throw InvalidArgument(of +
+                        " does not say enough to plan with: expected in the robot file, each key once, with values of "
+                        "your robot in place of these:" +
+                        lines);
 }
 
 filter::SignalErrors worst_case_errors(const DesignSubject& subject, const Measurement& measurement,
@@ -70,16 +116,22 @@ DesignSubject subject_of(const OnlineModel& model) {
   subject.known = model.box;
   subject.step = check::positive(model.measurement.nominal_step, "model: measurement.nominal_step");
   subject.prior.sides = model::prior_box(model.robot, model.model).bounds;
+  std::vector<std::size_t> unknown;
   for (std::size_t j = 0; j < model.model.p(); ++j) {
     const Interval &side = model.box.sides[j], &prior = subject.prior.sides[j];
     if (side.upper - side.lower > 0.5 * (prior.upper - prior.lower)) {
       const auto nominal = nominal_parameter(model.robot, model.model, j);
       if (!nominal) {
-        nothing_known(model.model.parameters[j]);
+        unknown.push_back(j);
+        continue;
       }
       subject.theta[static_cast<Eigen::Index>(j)] = *nominal;
       subject.effort_box.sides[j] = {*nominal, *nominal};
     }
+  }
+  if (!unknown.empty()) {
+    not_enough_known("the model, whose log did not show all parameters,",
+                     nominal_line(model.robot, model.model, unknown) + motor_line(model.robot, model.model));
   }
   // A model from the statistical mode has smaller bounds than the worst case.
   const commission::NoiseBudget budget = commission::noise_budget(subject.robot, subject.measurement);
@@ -111,10 +163,12 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
   filter::validate(subject.filter);
   subject.prior.sides = model::prior_box(robot, subject.model).bounds;
   subject.theta.resize(static_cast<Eigen::Index>(subject.model.p()));
+  std::vector<std::size_t> unknown;
   for (std::size_t j = 0; j < subject.model.p(); ++j) {
     const auto nominal = nominal_parameter(robot, subject.model, j);
     if (!nominal) {
-      nothing_known(subject.model.parameters[j]);
+      unknown.push_back(j);
+      continue;
     }
     subject.theta[static_cast<Eigen::Index>(j)] = *nominal;
     subject.effort_box.sides.push_back({*nominal, *nominal});
@@ -133,10 +187,15 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
     m.motion_columns.push_back(angles ? joint.angle : joint.speed);
     m.effort_columns.push_back("effort of " + joint.speed);
   }
+  std::string lines;
+  if (!unknown.empty()) {
+    lines = nominal_line(robot, subject.model, unknown) + motor_line(robot, subject.model);
+  }
   if (!commission::noise_budget(robot, m).complete) {
-    throw InvalidArgument(
-        "the noise is not declared: expected noise: {wheel_speed: …, effort: …} in the robot file (bounds, rad/s and "
-        "the unit of the effort), or a commissioned model, which has found it");
+    lines += noise_line(robot);
+  }
+  if (!lines.empty()) {
+    not_enough_known("the robot file", lines);
   }
   subject.averaging = commission::error_classes(robot, m);
   if (subject.averaging && !subject.averaging->average()) {

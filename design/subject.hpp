@@ -44,14 +44,15 @@ struct DesignSubject {
 /// From a commissioned model. A parameter that its log did not show (its bounds are the prior's) takes the robot's
 /// nominal value. Errors of the rows are worked out anew from declared noise, with the acceleration of the plan, where
 /// the model stands on declared noise in the worst case; else they are the model's.
-/// Throws InvalidArgument where a parameter is neither shown nor nominal.
+/// Throws InvalidArgument, with the line that the robot file lacks, where parameters are neither shown nor nominal.
 [[nodiscard]] DesignSubject subject_of(const OnlineModel& model);
 
 /// Before any log: nominal values and declared noise; effort limits hold at the nominal values. A log is expected to be
 /// sampled every `step` seconds, with wheel angles where their noise or the encoder is known, else with speeds; a
 /// filter that the robot file leaves open is taken as `filter`.
-/// Throws InvalidArgument, naming what the robot file lacks, unless every parameter has a nominal value and the noise
-/// of motion and effort is declared.
+/// Throws InvalidArgument, with all lines that the robot file lacks, units and values of an example in them, unless
+/// every parameter has a nominal value (for currents and voltages the motor's constants, too) and the noise of motion
+/// and effort is declared.
 [[nodiscard]] DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& filter = {2, 10.0, 10.0});
 
 /// The log along `plan` without noise: motion as the sensors see it, efforts as θ° needs them.

@@ -122,23 +122,34 @@ void check_directions(const HealthView& view, std::vector<LogFinding>& out) {
   check_speeds(forward, top, "rad/s of the wheels", out);
 }
 
+// Whether another wheel is much faster than `joint`, which may be dragged through a curve then: against its effort.
+bool is_inner(const HealthView& view, const JointView& joint, std::size_t k) {
+  constexpr double kMuchSlower = 0.8;
+  return std::ranges::any_of(view.joints, [&](const JointView& other) {
+    return std::abs(joint.smooth[k]) < kMuchSlower * std::abs(other.smooth[k]);
+  });
+}
+
 // Whether every joint has, in motion, efforts of both signs or speeds of one.
 void check_effort_sense(const HealthView& view, std::vector<LogFinding>& out) {
   for (const JointView& j : view.joints) {
-    double te = 0.0, ee = 0.0, ww = 0.0, ta = 0.0, aa = 0.0;
+    double te = 0.0, ee = 0.0, ww = 0.0, ta = 0.0, aa = 0.0, driven = 0.0;
     const std::vector<double>& t = view.log->t;
     for (const auto& [first, last] : view.segments) {
       for (std::size_t k = first + 5; k + 5 < last; ++k) {
         const double e = (*j.effort)[k], w = j.smooth[k];
         const double a = (j.smooth[k + 5] - j.smooth[k - 5]) / (t[k + 5] - t[k - 5]);
-        te += e * w;
+        if (!is_inner(view, j, k)) {
+          te += e * w;
+          ww += w * w;
+          driven += e * e;
+        }
         ta += e * a;
         ee += e * e;
-        ww += w * w;
         aa += a * a;
       }
     }
-    if (!(ee > 0.0) || !(ww > 0.0)) {
+    if (!(ee > 0.0)) {
       continue;
     }
     if (view.one_sided(j) && (!view.robot.effort_unsigned || !view.robot_given)) {
@@ -153,7 +164,8 @@ void check_effort_sense(const HealthView& view, std::vector<LogFinding>& out) {
            .columns = {j.effort_name}});
       continue;
     }
-    const double power = te / std::sqrt(ee * ww), inertia = aa > 0.0 ? ta / std::sqrt(ee * aa) : 0.0;
+    const double power = driven * ww > 0.0 ? te / std::sqrt(driven * ww) : 0.0;
+    const double inertia = aa > 0.0 ? ta / std::sqrt(ee * aa) : 0.0;
     if (!view.robot.effort_unsigned && ((power < -0.05 && inertia < 0.1) || (inertia < -0.3 && power < 0.05))) {
       out.push_back({.id = "units.effort_sign",
                      .topic = FindingTopic::units,

@@ -14,7 +14,7 @@ mkdir -p out
 # make LOG SCENARIO: a log is made again only when its scenario is newer.
 make() {
   if [ ! -s "$1" ] || [ "$2" -nt "$1" ]; then
-    "$program" simulate "$2" --out "$1"
+    "$program" simulate "$2" --out "$1" --force
   fi
 }
 

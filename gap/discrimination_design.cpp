@@ -11,6 +11,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/random.hpp>
 #include <wheelwright/design/stages.hpp>
+#include <wheelwright/gap/effort_units.hpp>
 #include <wheelwright/gap/further_drive.hpp>
 
 namespace wheelwright::gap {
@@ -164,6 +165,41 @@ design::PlanObjective tell_apart(const design::DesignSubject& subject, const std
   return [&subject, rivals, catalogue, noise, decidable](const design::Plan& plan) {
     return -least(discrimination(planned_drive(plan, subject), rivals, catalogue, noise), decidable);
   };
+}
+
+design::DesignSubject in_torques(const design::DesignSubject& subject) {
+  const TorqueView view = in_torques(subject.robot);
+  if (!view.physical || view.logged == model::EffortKind::torque) {
+    return subject;
+  }
+  design::DesignSubject out = subject;
+  const double scale = view.torque_per_effort;
+  const auto times = [scale](Box& box) {
+    for (Interval& side : box.sides) {
+      side = Interval{scale, scale} * side;
+    }
+  };
+  out.robot = view.robot;
+  out.model = model::make_model(view.robot);
+  out.theta *= scale;
+  times(out.effort_box);
+  times(out.prior);
+  if (out.known) {
+    times(*out.known);
+  }
+  if (out.errors) {
+    out.errors->output *= scale;
+  }
+  out.averaging.reset();
+  return out;
+}
+
+design::MotionLimits limits_in_torques(design::MotionLimits limits, const design::DesignSubject& subject) {
+  const TorqueView view = in_torques(subject.robot);
+  if (view.physical && limits.effort) {
+    *limits.effort *= view.torque_per_effort;
+  }
+  return limits;
 }
 
 std::vector<std::string> stage_words(const design::Plan& plan, const Model& model) {

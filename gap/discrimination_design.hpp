@@ -13,6 +13,13 @@
 
 namespace wheelwright::gap {
 
+/// `subject` with torques in place of currents or voltages, as a gap is diagnosed (TorqueView), where the motor's
+/// constants are known; as it is where they are not, and an A or a V stands for an N·m.
+[[nodiscard]] design::DesignSubject in_torques(const design::DesignSubject& subject);
+
+/// The effort limit of `limits` of the same.
+[[nodiscard]] design::MotionLimits limits_in_torques(design::MotionLimits limits, const design::DesignSubject& subject);
+
 /// Two rivals that one drive told nothing about.
 struct InseparablePair {
   std::size_t first = 0;

@@ -82,6 +82,9 @@ void describe_file(const FileWalk& lines, const CsvHeader& header, const std::ve
     file.time_origin = rows.clock_origin();
     file.notes.push_back(fmt::format("times are counts of {}, and were read as such", rows.clock_unit()));
   }
+  for (const auto& [name, factor] : header.factors) {
+    file.notes.push_back(fmt::format("{} is {} times {:g}", name, header.fields[header.found.at(name)], factor));
+  }
   const files::ByteSource& source = lines.lines.source();
   file.format = "csv";
   file.packing = source.packing();

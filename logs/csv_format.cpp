@@ -98,6 +98,18 @@ std::size_t demand_field(const std::vector<std::string>& fields, const std::stri
                                core::listed(fields), files::did_you_mean(name, fields)));
 }
 
+/// COLUMN*FACTOR in its parts; the factor is 1 where there is none.
+std::pair<std::string, double> with_factor(const std::vector<std::string>& fields, const std::string& text) {
+  const std::size_t star = text.rfind('*');
+  if (star == std::string::npos || find_field(fields, text)) {
+    return {text, 1.0};
+  }
+  const auto factor = files::to_number(trimmed_field(std::string_view(text).substr(star + 1)));
+  return factor && std::isfinite(*factor) && *factor != 0.0
+             ? std::pair{std::string(trimmed_field(std::string_view(text).substr(0, star))), *factor}
+             : std::pair{text, 1.0};
+}
+
 void recognise(CsvHeader& header, const CsvOptions& options, const std::string& place) {
   std::map<std::string, std::vector<std::size_t>> candidates;
   for (std::size_t k = 0; k < header.fields.size(); ++k) {
@@ -163,7 +175,11 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
   header.fields = split_fields(line, header.separator);
   check_has_names(header.fields, place);
   for (const auto& [name, column] : options.map) {
-    header.found[name] = demand_field(header.fields, column, "which --map " + name + "=" + column + " names", place);
+    const auto [field, factor] = with_factor(header.fields, column);
+    header.found[name] = demand_field(header.fields, field, "which --map " + name + "=" + column + " names", place);
+    if (factor != 1.0) {
+      header.factors[name] = factor;
+    }
   }
   for (const std::string& name : options.extra) {
     if (!header.found.contains(name)) {
@@ -172,10 +188,40 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
   }
   recognise(header, options, place);
   if (!header.found.contains("t")) {
-    throw InputError(fmt::format("{}: no column for t (time, s): expected one of {}{}; see --map t=COLUMN", place,
-                                 core::listed(header.fields), files::did_you_mean("time", header.fields)));
+    throw InputError(fmt::format("{}: no column for t (time, s): expected one of {}{}; see --map t=COLUMN{}", place,
+                                 core::listed(header.fields), files::did_you_mean("time", header.fields),
+                                 known_logger(header.fields)));
   }
   return header;
+}
+
+std::string known_logger(const std::vector<std::string>& fields) {
+  const auto ending = [&](std::string_view name) {
+    const auto found = std::ranges::find_if(fields, [&](const std::string& field) { return field.ends_with(name); });
+    return found == fields.end() ? std::string() : *found;
+  };
+  if (const std::string speed = ending("erpm"); !speed.empty() && !ending("ms_today").empty()) {
+    return fmt::format(
+        "; this is a log of VESC Tool, of one motor: as one axis it is read with columns: {{t: {}*0.001, velocity: "
+        "{}*F, effort: {}*K}} in the robot file, where F is the number 0.10472/(pole pairs · gear ratio) and K torque "
+        "constant · gear ratio; for a robot on two wheels join the logs of both motors by time first (docs/formats.md)",
+        ending("ms_today"), speed, ending("q_axis_current"));
+  }
+  const std::string right = ending("axis0.encoder.vel_estimate"), left = ending("axis1.encoder.vel_estimate");
+  const std::string right_current = ending("axis0.motor.current_control.Iq_measured"),
+                    left_current = ending("axis1.motor.current_control.Iq_measured");
+  if (!right.empty() && !left.empty()) {
+    return fmt::format(
+        "; this is a log of an ODrive, in turns/s of the motors: where axis0 is the right wheel it is read with "
+        "columns: "
+        "{{omega_r: {}*F, omega_l: {}*F{}}} in the robot file, where F is the number 6.2832/(gear ratio); a motor that "
+        "turns backwards when the robot drives ahead has -F, and *-1 behind its current (docs/formats.md)",
+        right, left,
+        right_current.empty() || left_current.empty()
+            ? ""
+            : fmt::format(", current_r: {}, current_l: {}", right_current, left_current));
+  }
+  return {};
 }
 
 bool is_csv_content(std::string_view line) {
@@ -221,9 +267,19 @@ void CsvRowReader::begin_file(const CsvHeader& header, std::string path) {
     }
     of_field = slot;
   };
+  limits_ = cleaner_.limits();
+  factors_.clear();
   take("t", 0);
   for (std::size_t c = 0; c < names_.size(); ++c) {
     take(names_[c], static_cast<int>(c) + 1);
+  }
+  for (const auto& [name, factor] : header.factors) {
+    const auto at = std::ranges::find(names_, name);
+    if (name == "t" || at != names_.end()) {
+      const std::size_t index = name == "t" ? 0 : static_cast<std::size_t>(at - names_.begin()) + 1;
+      factors_.emplace_back(index, factor);
+      limits_[index] /= std::abs(factor);
+    }
   }
 }
 
@@ -233,7 +289,7 @@ std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
   const char* const end = p + line.size();
   const char separator = separator_;
   const std::size_t known = slots_.size();
-  const std::vector<double>& limits = cleaner_.limits();
+  const std::vector<double>& limits = limits_;
   for (std::size_t field = 0;; ++field) {
     const int slot = field < known ? slots_[field] : -1;
     if (slot < 0) {
@@ -286,7 +342,7 @@ void CsvRowReader::convert_time(std::string_view text) {
   const bool whole = error == std::errc() && end == text.data() + text.size() && count >= 0;
   if (!clock_.known) {
     clock_.known = true;
-    if (whole && t > cleaner_.limits()[0]) {
+    if (whole && t > limits_[0]) {
       constexpr double a_year = 3.2e7;  // s: later than 1971, whichever unit
       for (const auto& [seconds, unit] : {std::pair{1e-9, "ns"}, {1e-6, "µs"}, {1e-3, "ms"}}) {
         if (t * seconds > a_year && t * seconds < 1e3 * a_year) {
@@ -335,7 +391,7 @@ const char* CsvRowReader::read_odd_field(const char* p, const char* end, std::si
     if (slots_[field] == 0 && (!clock_.known || clock_.seconds < 1.0)) {
       convert_time(text);
     }
-    if (!(std::abs(value) <= cleaner_.limits()[static_cast<std::size_t>(slots_[field])])) {
+    if (!(std::abs(value) <= limits_[static_cast<std::size_t>(slots_[field])])) {
       fault = Fault::limit;
     }
   }
@@ -380,6 +436,9 @@ bool CsvRowReader::read_numbers(std::string_view line, std::size_t line_number, 
     cleaner_.count(defect.fault == Fault::empty ? &LogReport::empty : &LogReport::not_finite, line_number,
                    fields_[defect.field]);
     return false;
+  }
+  for (const auto& [index, factor] : factors_) {
+    values_[index] *= factor;
   }
   return true;
 }

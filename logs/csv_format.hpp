@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <wheelwright/logs/row_log.hpp>
@@ -19,7 +20,8 @@ namespace wheelwright::logs {
 /// Options for reading a CSV log.
 struct CsvOptions {
   /// Contract name (or a name in `extra`) -> column of the file, for headers that no spelling covers
-  /// (`--map name=column`). It goes before everything else.
+  /// (`--map name=column`). It goes before everything else. COLUMN*FACTOR multiplies what stands in COLUMN, for logs in
+  /// other units, where no column is called so.
   std::map<std::string, std::string> map;
   /// Further columns to read under their own names; a file that lacks one is an error.
   std::vector<std::string> extra;
@@ -35,7 +37,12 @@ struct CsvHeader {
   char separator = ',';
   std::vector<std::string> fields;           ///< the columns as written, quotes and surrounding blanks removed
   std::map<std::string, std::size_t> found;  ///< wanted name (`t` among them) -> field
+  std::map<std::string, double> factors;     ///< wanted name -> FACTOR of its field, where it has one
 };
+
+/// What to write where `fields` are those of a known program's log that names no columns of the log contract (VESC Tool,
+/// ODrive), beginning with "; "; empty for others.
+[[nodiscard]] std::string known_logger(const std::vector<std::string>& fields);
 
 /// Splits `line` at `separator`; quotes around a field are removed ("" inside them is one quote), and blanks around it.
 [[nodiscard]] std::vector<std::string> split_fields(std::string_view line, char separator);
@@ -116,8 +123,10 @@ class CsvRowReader {
   Clock clock_;
   std::vector<int> slots_;  ///< field -> index in values_, or −1
   char separator_ = ',';
-  std::vector<double> values_;  ///< time, then the columns
-  std::vector<bool> missable_;  ///< of each value; empty: none
+  std::vector<double> values_;                           ///< time, then the columns
+  std::vector<double> limits_;                           ///< of the numbers as written
+  std::vector<std::pair<std::size_t, double>> factors_;  ///< of values_
+  std::vector<bool> missable_;                           ///< of each value; empty: none
 };
 
 }  // namespace wheelwright::logs

@@ -11,6 +11,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/words.hpp>
+#include <wheelwright/logs/csv_format.hpp>
 
 namespace wheelwright::logs {
 namespace {
@@ -351,7 +352,8 @@ void require_columns(const LogSource& source, const std::vector<std::string>& na
     }
   }
   if (!missing.empty()) {
-    throw InputError(fmt::format("{}: no column for {}: the file has {}{}", file, missing, core::listed(has), hint));
+    throw InputError(fmt::format("{}: no column for {}: the file has {}{}", file, missing, core::listed(has), hint) +
+                     known_logger(has));
   }
 }
 

@@ -296,7 +296,8 @@ std::string unseen(const Commissioning& result) {
   }
   std::string text = "The log says nothing about " + core::enumerated(names) + ".";
   if (!todo.empty()) {
-    text += " What to do: " + core::enumerated(todo) + ", and commission again.";
+    text += " What to do: " + core::enumerated(todo) +
+            " (`wheelwright design --for bounds` plans such a drive), and commission again.";
   }
   if (result.has_model()) {
     text += " Until then their bounds are the prior’s, and thresholds are wide wherever they matter.";
@@ -420,7 +421,7 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
   } else if (smallest_certain_kappa(result).value_or(coarse_kappa) >= coarse_kappa) {
     out.emplace_back(
         "Only coarse faults are certain to be seen: a longer log with stronger acceleration and tighter curves, or a "
-        "quieter effort signal, would narrow the thresholds.");
+        "quieter effort signal, would narrow the thresholds; `wheelwright design --for bounds` plans such a drive.");
   }
   return out;
 }
@@ -437,6 +438,11 @@ std::optional<double> smallest_certain_kappa(const Commissioning& result) {
   return std::isfinite(least) ? std::optional(least) : std::nullopt;
 }
 
+bool sees_nothing(const Commissioning& result) {
+  constexpr double useless_kappa = 1.0;
+  return held_out_instants(result) > 0 && !(smallest_certain_kappa(result).value_or(INFINITY) <= useless_kappa);
+}
+
 double radius_change(double kappa) { return std::sqrt(1.0 + kappa) - 1.0; }
 
 Standing standing(const Commissioning& result) {
@@ -450,11 +456,17 @@ Standing standing(const Commissioning& result) {
 }
 
 std::string verdict(const Commissioning& result) {
+  const std::string instead =
+      sees_nothing(result)
+          ? " No fault is certain to be seen on driving like this: speed up and brake, drive curves to "
+            "both sides (`wheelwright design --for bounds` plans such a drive), and commission again."
+          : "";
   switch (result.status) {
     case Status::done:
       return standing(result) == Standing::good ? "Commissioned: the model can watch this robot."
-                                                : "Commissioned, with something to be read first.";
-    case Status::partial: return "Commissioned in part: the log does not show every parameter.";
+             : instead.empty()                  ? "Commissioned, with something to be read first."
+                                                : "Commissioned, but little was learned." + instead;
+    case Status::partial: return "Commissioned in part: the log does not show every parameter." + instead;
     case Status::empty: return "No model: the log contradicts the model within the declared noise.";
     case Status::nothing: return "No model: the log shows none of the parameters.";
     case Status::contradicted: return "No model: the log contradicts what a model takes for granted.";

@@ -60,6 +60,9 @@ struct ParameterViews {
 /// Smallest |κ| over the outputs that held-out driving shows for certain; nothing where it shows none.
 [[nodiscard]] std::optional<double> smallest_certain_kappa(const Commissioning& result);
 
+/// Whether the held-out driving shows no fault for certain that is smaller than the effort itself (|κ| ≤ 1).
+[[nodiscard]] bool sees_nothing(const Commissioning& result);
+
 /// |δ1|/r = √(1 + κ) − 1: the growth of both wheel radii that ζ = κ·Yθ means.
 [[nodiscard]] double radius_change(double kappa);
 
@@ -71,7 +74,7 @@ enum class Standing { good, caution, bad };
 /// coarse faults only). bad: no model.
 [[nodiscard]] Standing standing(const Commissioning& result);
 
-/// One short sentence. Text, not HTML.
+/// One short sentence, and what to drive instead where the model sees nothing. Text, not HTML.
 [[nodiscard]] std::string verdict(const Commissioning& result);
 
 /// Three to six sentences: what was found, what it stands on, how it fared on held-out driving, what it can see, and

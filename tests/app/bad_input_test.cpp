@@ -263,7 +263,7 @@ TEST_F(BadInput, NothingHalfWrittenStaysWhenTheDiskIsFull) {
   put("result/model.json", "the result of yesterday\n");
   // The shell's limit on the size of a file stands for the full disk; with SIGXFSZ ignored a write beyond it fails.
   const Outcome outcome =
-      run("commission log.csv --robot robot.yaml --out result", "/dev/null", "trap '' XFSZ; ulimit -f 16;");
+      run("commission log.csv --robot robot.yaml --out result --force", "/dev/null", "trap '' XFSZ; ulimit -f 16;");
   EXPECT_EQ(outcome.code, 2) << outcome.out;
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("result/"), HasSubstr("expected enough room on the disk")));
   EXPECT_THAT(names_in("result"), ElementsAre("model.json"));

@@ -71,6 +71,35 @@ TEST_F(SlowDesign, DesignSimulateCommissionInARow) {
   }
 }
 
+TEST_F(Design, NamesAllThatIsMissingAtOnce) {
+  // The robot file of docs/own_log.md.
+  const std::string own =
+      "name: my_robot\nmodel: differential_drive\nwheel_radius: 0.0975\ntrack_width: 0.381\n"
+      "effort: {kind: torque}\n";
+  put("own.yaml", own + "noise: estimate\n");
+  const Outcome refused = run("design --robot own.yaml --for bounds --out plan");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_FALSE(std::filesystem::exists(path("plan")));
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("own.yaml"), HasSubstr("kg, kg·m², N·s/m, N·m·s/rad"),
+                                 HasSubstr("rad/s, N·m"), HasSubstr("--speed and --acceleration")));
+
+  // What it says to write is all that was missing, for currents the motor's constants, too.
+  const std::string brief = " --for bounds --duration 4 --stages 1 --rate 50 --quiet";
+  for (const std::string kind : {"torque", "current", "voltage"}) {
+    std::string file = own;
+    file.replace(file.find("torque"), 6, kind);
+    put("robot_of_kind.yaml", file);
+    std::string lines;
+    for (const std::string& line : testing::lines_of(run("design --robot robot_of_kind.yaml" + brief).err)) {
+      lines += line.starts_with("  ") ? line.substr(2) + "\n" : "";
+    }
+    EXPECT_EQ(lines.find("motor:") != std::string::npos, kind != "torque") << lines;
+    put("robot_of_kind.yaml", file + lines);
+    const Outcome done = run("design --robot robot_of_kind.yaml" + brief);
+    EXPECT_EQ(done.code, 0) << done.err << lines;
+  }
+}
+
 TEST_F(Design, TellsBothPromises) {
   const std::string design = "design --robot robot.yaml --json --duration 10 --stages 1 --rate 50";
   const Outcome told = run(design + kLimits);

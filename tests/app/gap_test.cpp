@@ -91,6 +91,7 @@ TEST_F(Gap, AHealthyRobotHasNone) {
   drive("again", "robot.yaml", 2, "", 40);
   std::filesystem::create_directories(path("gap"));
   put("gap/robot_improved.yaml", "of an earlier run");
+  put("gap/gap.json", "{\n  \"schema\": \"wheelwright/gap/1\"}");
   const Outcome told = run("gap again.csv --robot robot.yaml --baseline healthy.csv --no-shrink --out gap");
   ASSERT_EQ(told.code, 0) << told.err;
   EXPECT_THAT(told.out, AllOf(HasSubstr("No gap"), HasSubstr("nothing is to be added")));

@@ -88,7 +88,7 @@ class Metamorphic : public testing::ProgramTest {
             "  encoder_counts_per_turn: 4096, log: [angles, speeds, pose]}}\nrate: 128\n",
             mass, speed, yaw, seed));
     std::filesystem::remove(path("drawn.csv"));
-    RC_ASSERT(run("simulate drive.yaml --out drawn.csv --quiet").err == "");
+    RC_ASSERT(run("simulate drive.yaml --out drawn.csv --quiet --force").err == "");
     Drive drive;
     drive.healthy = core::read_all(*logs::open_log({path("drawn.csv")}));
     drive.faulty = drive.healthy;

@@ -2,6 +2,7 @@
 // Results: the truth inside its bounds, the same digits each time, batch and stream of one mind, and files that fit
 // their schemas.
 #include <algorithm>
+#include <cmath>
 
 #include "app/program.hpp"
 
@@ -208,6 +209,30 @@ TEST_F(Results, AContradictedLogLeavesNoModelThatADetectorBelieves) {
   const Outcome refused = run("detect " + shipped() + " --model late/model.json");
   EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, HasSubstr("holds no model"));
+}
+
+// One short push in half a minute of standing: every parameter shows, and held-out driving shows no fault.
+TEST_F(Results, ADriveThatTeachesLittleIsNotPraised) {
+  std::vector<std::string> table = {"t,command_r,command_l"};
+  for (int k = 0; k <= 300; ++k) {
+    const double t = 0.1 * k, push = t > 2.0 && t < 4.0 ? 5.0 * std::pow(std::sin(1.5707963 * (t - 2.0)), 2) : 0.0;
+    const double turn = t > 5.0 && t < 7.0 ? 3.0 * std::pow(std::sin(1.5707963 * (t - 5.0)), 2) : 0.0;
+    table.push_back(fmt::format("{:.1f},{:.6f},{:.6f}", t, push + turn, push - turn));
+  }
+  put_lines("table.csv", table);
+  put("push.yaml",
+      "robot: robot.yaml\nparameters: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}\n"
+      "trajectory: {kind: table, file: table.csv}\nduration: 30\n"
+      "sensors: {noise: uniform, wheel_speed: 0.02, effort: 0.02, encoder_counts_per_turn: 4096, log: [angles]}\n");
+  ASSERT_EQ(run("simulate push.yaml --out push.csv --quiet").code, 0);
+  const Outcome outcome = run("commission push.csv --robot robot.yaml --out push");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  const Json model = read_json(path("push/model.json"));
+  EXPECT_EQ(model.at("status"), "done");
+  const std::string message = model.at("message");
+  EXPECT_THAT(message, AllOf(HasSubstr("commissioned, but little was learned"), HasSubstr("design --for bounds")));
+  EXPECT_THAT(outcome.out, HasSubstr(message));
+  EXPECT_THAT(bytes(path("push/report.html")), HasSubstr("Commissioned, but little was learned."));
 }
 
 // Time in ms, rows six times sparser than the model's, and a log that is over before the filter has settled.

@@ -165,7 +165,9 @@ TEST_F(Robust, OutputGoesIntoPipesAndThroughLinks) {
 
   put("real.csv", "old");
   fs::create_symlink("real.csv", path("link.csv"));
-  EXPECT_EQ(run("simulate " + scenario + " --out link.csv").code, 0);
+  EXPECT_EQ(run("simulate " + scenario + " --out link.csv").code, 2);
+  EXPECT_EQ(bytes(path("real.csv")), "old");
+  EXPECT_EQ(run("simulate " + scenario + " --out link.csv --force").code, 0);
   EXPECT_TRUE(fs::is_symlink(path("link.csv")));
   EXPECT_EQ(bytes(path("real.csv")), bytes(path("plain.csv")));
 }

@@ -417,6 +417,21 @@ TEST_F(LogHealthTest, SignsAndSides) {
   expect("units.heading_sign", kFatal);
 }
 
+TEST_F(LogHealthTest, AWheelThatIsDraggedThroughACurveHasNoWrongSign) {
+  // A creeping circle to the left: friction against turning is more than that against driving, so that the left wheel
+  // brakes while it rolls forwards.
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    const double noise = k % 2 == 0 ? 1e-3 : -1e-3;
+    log.column("omega_r")[k] = 0.7 + noise;
+    log.column("omega_l")[k] = 0.3 + noise;
+    log.column("phi_r")[k] = 0.7 * log.t[k];
+    log.column("phi_l")[k] = 0.3 * log.t[k];
+    log.column("tau_r")[k] = 0.05 + noise;
+    log.column("tau_l")[k] = -0.01 + noise;
+  }
+  EXPECT_EQ(examine(log, robot).find("units.effort_sign"), nullptr);
+}
+
 TEST_F(LogHealthTest, EffortsInOtherUnitsSignsAndSides) {
   const LogTable sound = log;
   scale({"tau_r", "tau_l"}, 1000.0);

@@ -187,6 +187,42 @@ TEST_F(Csv, MapsAndExtraColumns) {
   EXPECT_EQ(table.column("battery")[0], 2.0);
 }
 
+TEST_F(Csv, AFactorBehindAColumnsNameConvertsItsNumbers) {
+  // As VESC Tool writes them: ms of the day, electrical turns a minute, beyond what rad/s may be, an end without a name.
+  std::string text = "ms_today;erpm;q_axis_current;a*2;\n";
+  for (int k = 0; k < 30; ++k) {
+    text += fmt::format("{};{};\"-2.5\";{};\n", 36000000 + 20 * k, 42000 + k, k);
+  }
+  CsvOptions options;
+  options.map = {
+      {"t", "ms_today*0.001"}, {"velocity", "erpm * 0.005"}, {"effort", "q_axis_current*-2"}, {"position", "a*2"}};
+  const LogTable table = read(text, options);
+  ASSERT_EQ(table.rows(), 30U);
+  EXPECT_NEAR(table.t[1] - table.t[0], 0.02, 1e-9);
+  EXPECT_DOUBLE_EQ(table.column("velocity")[3], 42003 * 0.005);
+  EXPECT_DOUBLE_EQ(table.column("effort")[3], 5.0);
+  EXPECT_DOUBLE_EQ(table.column("position")[3], 3.0);  // a column that is called so
+  EXPECT_THAT(report.files[0].notes, ::testing::Contains(HasSubstr("velocity is erpm times 0.005")));
+
+  for (const char* raw : {"erpm*5", "erpm*zero"}) {  // beyond what a speed may be; no factor
+    options.map["velocity"] = raw;
+    EXPECT_THAT(input_error([&] { read(text, options); }), AllOf(HasSubstr("log.csv"), HasSubstr("erpm")));
+  }
+}
+
+TEST_F(CsvError, LogsOfKnownProgramsSayWhatToWrite) {
+  EXPECT_THAT(
+      input_error([&] { read("ms_today;q_axis_current;erpm;\n1;2;3;\n"); }),
+      AllOf(HasSubstr("VESC Tool"), HasSubstr("t: ms_today*0.001, velocity: erpm*F, effort: q_axis_current*K")));
+  CsvOptions options;
+  options.extra = {"odrv0.axis0.encoder.vel_estimate"};
+  const CsvLog odrive(
+      {put("odrive.csv", "t,odrv0.axis0.encoder.vel_estimate,odrv0.axis1.encoder.vel_estimate\n" + rows_of(0, 30))},
+      options);
+  EXPECT_THAT(input_error([&] { require_columns(odrive, {"omega_r|phi_r"}); }),
+              AllOf(HasSubstr("ODrive"), HasSubstr("omega_l: odrv0.axis1.encoder.vel_estimate*F")));
+}
+
 TEST_F(Csv, OnlyWantedColumnsMatter) {
   CsvOptions options;
   options.only = {"omega_r"};

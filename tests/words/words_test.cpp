@@ -120,6 +120,9 @@ TEST(CommissionWords, FalseAlarmsAndIdleThresholdsAreNotPraised) {
   }
   EXPECT_EQ(standing(blind), Standing::caution);
   EXPECT_THAT(spoken(blind), HasSubstr("no change of scale"));
+  EXPECT_THAT(verdict(blind), AllOf(HasSubstr("little was learned"), HasSubstr("design --for bounds")));
+  blind.status = Commissioning::Status::partial;
+  EXPECT_THAT(verdict(blind), AllOf(HasSubstr("in part"), HasSubstr("No fault is certain"), HasSubstr("design")));
 
   Commissioning coarse = example::done();
   for (commission::OutputValidation& v : coarse.validation) {
@@ -127,6 +130,7 @@ TEST(CommissionWords, FalseAlarmsAndIdleThresholdsAreNotPraised) {
   }
   EXPECT_EQ(standing(coarse), Standing::caution);
   EXPECT_THAT(spoken(coarse), HasSubstr("Only coarse faults"));
+  EXPECT_THAT(verdict(coarse), Not(HasSubstr("little")));
 
   Commissioning untried = example::done();
   untried.validation.clear();

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// What stands where a command is to write: its own earlier result is replaced, nothing else is.
+#include <sys/stat.h>
+
+#include <chrono>
+
+#include "app/program.hpp"
+
+namespace wheelwright::app::out_test {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::Outcome;
+
+class Out : public testing::ProgramTest {
+ protected:
+  std::string healthy() const {
+    return "'" + (examples() / "healthy.csv.gz").string() + "' --robot robot.yaml --quiet";
+  }
+
+  void refuses(const std::string& command, const std::string& file, const std::string& whose) const {
+    const std::string before = bytes(path(file));
+    const Outcome outcome = run(command);
+    EXPECT_EQ(outcome.code, 2) << command;
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr(file + ": is there already"), HasSubstr(whose), HasSubstr("--force")));
+    EXPECT_EQ(bytes(path(file)), before) << command;
+  }
+};
+
+TEST_F(Out, ACommandReplacesItsOwnResultAndNoOther) {
+  const std::string doctor = "doctor " + healthy() + " --out out", identify = "identify " + healthy() + " --out out";
+  ASSERT_EQ(run(doctor).code, 0);
+  const std::string first = bytes(path("out/report.html"));
+  EXPECT_EQ(run(doctor).code, 0);
+  EXPECT_EQ(bytes(path("out/report.html")), first);
+
+  refuses(identify, "out/report.html", "the page of `wheelwright doctor`");
+  EXPECT_THAT(names_in("out"), ::testing::ElementsAre("doctor.json", "report.html"));
+  EXPECT_EQ(run(identify + " --force").code, 0);
+  EXPECT_NE(bytes(path("out/report.html")), first);
+  refuses(doctor, "out/report.html", "the page of `wheelwright identify`");
+}
+
+TEST_F(Out, AFailurePageIsOnesOwn) {
+  put("log.csv", "t,omega_r,omega_l\n0,1,1\n1,1,1\n");
+  for (int time = 0; time < 2; ++time) {
+    const Outcome outcome = run("commission log.csv --robot robot.yaml --out out --quiet");
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_THAT(outcome.err, ::testing::Not(HasSubstr("is there already")));
+  }
+}
+
+TEST_F(Out, WhatAUserWroteStays) {
+  fs::create_directory(path("out"));
+  for (const auto& [file, whose] : {std::pair{"out/doctor.json", "no result of `wheelwright doctor`"},
+                                    std::pair{"out/report.html", "not written by `wheelwright doctor`"}}) {
+    put(file, "mine");
+    refuses("doctor " + healthy() + " --out out", file, whose);
+    fs::remove(path(file));
+  }
+  put("mine.html", "mine");
+  fs::create_symlink("../mine.html", path("out/report.html"));
+  refuses("doctor " + healthy() + " --out out", "out/report.html", "not written");
+  EXPECT_EQ(bytes(path("mine.html")), "mine");
+}
+
+TEST_F(Out, WhatAUserChangedStays) {
+  const std::string design =
+      "design --robot robot.yaml --for bounds --speed 8 --acceleration 20 --duration 4 --stages 1 --rate 50 --quiet "
+      "--out plan";
+  ASSERT_EQ(run(design).code, 0);
+  ASSERT_EQ(run(design).code, 0);
+  put("plan/manoeuvre.csv", "t,command_r\n");
+  const auto written = fs::last_write_time(path("plan/design.json"));
+  fs::last_write_time(path("plan/manoeuvre.csv"), written + std::chrono::minutes(1));
+  refuses(design, "plan/manoeuvre.csv", "changed since `wheelwright design` wrote it");
+  EXPECT_EQ(run(design + " --force").code, 0);
+}
+
+TEST_F(Out, ALogIsNotReplaced) {
+  simulate("shipped.yaml", "log.csv");
+  const std::string again = "simulate '" + (examples() / "scenarios/shipped.yaml").string() + "' --out log.csv";
+  refuses(again, "log.csv", "expected a new name");
+  EXPECT_EQ(run(again + " --force --quiet").code, 0);
+  ASSERT_EQ(mkfifo(path("pipe.csv").c_str(), 0600), 0);
+  EXPECT_EQ(run("simulate '" + (examples() / "scenarios/shipped.yaml").string() + "' --out pipe.csv --quiet",
+                "/dev/null", "cat pipe.csv > piped.csv &")
+                .code,
+            0);
+}
+
+TEST_F(Out, AHeaderAndManualPagesOfOnesOwnAreWrittenAgain) {
+  commission_shipped();
+  const std::string header = "export model/model.json --language c --out firmware --quiet";
+  ASSERT_EQ(run(header).code, 0);
+  EXPECT_EQ(run(header).code, 0);
+  put("firmware/wheelwright.h", "#pragma once\n");
+  refuses(header, "firmware/wheelwright.h", "expected a new name");
+  ASSERT_EQ(run("man --out pages").code, 0);
+  EXPECT_EQ(run("man --out pages").code, 0);
+  put("pages/wheelwright-check.1", "mine");
+  refuses("man --out pages", "pages/wheelwright-check.1", "expected a new name");
+
+  // The series is a log, too; and a model's directory is not another command's.
+  put("series.csv", "t\n");
+  const std::string detect =
+      "detect '" + (examples() / "healthy.csv.gz").string() + "' --model model/model.json --quiet";
+  refuses(detect + " --series series.csv", "series.csv", "expected a new name");
+  refuses(detect + " --out model", "model/report.html", "the page of `wheelwright commission`");
+}
+
+TEST_F(Out, AFailedRunLeavesNoDirectory) {
+  EXPECT_EQ(run("doctor no.csv --robot robot.yaml --out a/b").code, 2);
+  EXPECT_FALSE(fs::exists(path("a")));
+}
+
+}  // namespace
+}  // namespace wheelwright::app::out_test
