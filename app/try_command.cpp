@@ -23,6 +23,7 @@
 #include <wheelwright/robots/robot_description.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/robots/robot_origin.hpp>
+#include <wheelwright/words/summary.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
@@ -272,15 +273,14 @@ std::vector<std::string> quantities(const Json& model) {
   return out;
 }
 
-std::string smallest_change(const Json& model) {
+std::string smallest_change(const Json& model, const Robot& robot) {
   double least = std::numeric_limits<double>::infinity();
   for (const Json& output : model.at("validation").value("outputs", Json::array())) {
     if (const auto kappa = output.find("smallest_certain_kappa"); kappa != output.end() && kappa->is_number()) {
       least = std::min(least, kappa->get<double>());
     }
   }
-  return std::isfinite(least) ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen", 100.0 * least)
-                              : "";
+  return std::isfinite(least) ? words::smallest_fault(robot, least) : "";
 }
 
 std::vector<std::string> troubles(const Json& doctor, const std::string& severity) {
@@ -384,7 +384,7 @@ int run(const Arguments& given) {
     page.model = model.contains("detector");
     verdict = fmt::format("{}: {}", page.model ? "A model" : "No model", model.at("message").get<std::string>());
     if (page.model) {
-      if (const std::string least = smallest_change(model); !least.empty()) {
+      if (const std::string least = smallest_change(model, robot); !least.empty()) {
         verdict += "; " + least;
       }
       page.content.warrant = robots::read_model(out / "commission" / "model.json").warrant;

@@ -263,8 +263,10 @@ void check_columns(const HealthView& view, std::vector<LogFinding>& out) {
     lacking("signals.no_motion", FindingSeverity::fatal,
             motion.empty() ? "Some joints have speeds only and others angles only: all need one kind."
                            : fmt::format("The log lacks {}.", core::listed(motion)),
-            fmt::format("It has {}: rename columns with --map NAME=COLUMN, or log the motion.",
-                        core::listed(view.log->names)));
+            view.log->names.empty()
+                ? "No column is known: rename columns with --map NAME=COLUMN, or log the motion."
+                : fmt::format("It has {}: rename columns with --map NAME=COLUMN, or log the motion.",
+                              core::listed(view.log->names)));
   }
   if (!effort.empty()) {
     std::vector<std::string> others;

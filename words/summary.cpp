@@ -64,18 +64,6 @@ std::string parameter_table(const Commissioning& r) {
   return text;
 }
 
-// The smallest fault ζ = κ·Yθ that is certainly seen, in the words of the robot's kind.
-std::string smallest_fault(const Robot& robot, double kappa) {
-  constexpr double useless = 1.0;
-  if (!std::isfinite(kappa) || kappa > useless) {
-    return "no fault that scales the effort is certainly seen: the threshold is as wide as the effort itself";
-  }
-  return model::on_two_wheels(robot)
-             ? fmt::format("a change of the wheel radius by {:.2g} % is certainly seen",
-                           100.0 * (std::sqrt(1.0 + kappa) - 1.0))
-             : fmt::format("a change of the effort by {:.2g} % is certainly seen", 100.0 * kappa);
-}
-
 std::string kinematic_table(const commission::KinematicCommissioning& k) {
   std::string text;
   if (k.model) {
@@ -147,6 +135,17 @@ std::string reach_lines(const Commissioning& r) {
 }
 
 }  // namespace
+
+std::string smallest_fault(const Robot& robot, double kappa) {
+  constexpr double useless = 1.0;
+  if (!std::isfinite(kappa) || kappa > useless) {
+    return "no fault that scales the effort is certainly seen: the threshold is as wide as the effort itself";
+  }
+  const std::string change = model::on_two_wheels(robot)
+                                 ? fmt::format("the wheel radius by {:.2g} %", 100.0 * (std::sqrt(1.0 + kappa) - 1.0))
+                                 : fmt::format("the effort by {:.2g} %", 100.0 * kappa);
+  return "a change of " + change + " is certainly seen at the best moment";
+}
 
 std::string summary(const Commissioning& r) {
   std::string text = fmt::format("{}: {}\n", r.model.robot.name, r.message);
