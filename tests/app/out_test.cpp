@@ -88,9 +88,10 @@ TEST_F(Out, ALogIsNotReplaced) {
   EXPECT_EQ(run(again + " --force --quiet").code, 0);
   ASSERT_EQ(mkfifo(path("pipe.csv").c_str(), 0600), 0);
   EXPECT_EQ(run("simulate '" + (examples() / "scenarios/shipped.yaml").string() + "' --out pipe.csv --quiet",
-                "/dev/null", "cat pipe.csv > piped.csv &")
+                "/dev/null", "timeout 60 sh -c 'cat pipe.csv > piped.csv & \"$@\"; wait' sh")
                 .code,
             0);
+  EXPECT_EQ(bytes(path("piped.csv")), bytes(path("log.csv")));
 }
 
 TEST_F(Out, AHeaderAndManualPagesOfOnesOwnAreWrittenAgain) {
