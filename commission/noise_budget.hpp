@@ -44,8 +44,8 @@ enum class RowUse { learning, driving };
 /// An output in which only parameters move that the log does not excite tells no noise: what it leaves with these
 /// parameters held at 0 lacks the noise of their columns times their true values. Its estimated bounds become what all
 /// of `prior` explains, so that no bound on a parameter and no fault is made of it. No bound of such an output, nor of
-/// one in which nothing moves at all (0 where both wheels are logged alike), is less than what the other outputs have of
-/// the same joints, by `input` (outputs × joints). In any other output, driving to come may have what the columns of
+/// one in which nothing moves at all (0 where both wheels are logged alike), is less than what the other outputs have
+/// of the same joints, by `input` (outputs × joints). In any other output, driving to come may have what the columns of
 /// `noise_alone` (p) are with the largest parameters of `prior`. Returns whether any bound was widened by the prior.
 bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSource& rows, const Box& prior,
                           const std::vector<identify::ExcitationFinding>& excitation,

@@ -40,8 +40,8 @@ struct CsvHeader {
   std::map<std::string, double> factors;     ///< wanted name -> FACTOR of its field, where it has one
 };
 
-/// What to write where `fields` are those of a known program's log that names no columns of the log contract (VESC Tool,
-/// ODrive), beginning with "; "; empty for others.
+/// What to write where `fields` are those of a known program's log that names no columns of the log contract (VESC
+/// Tool, ODrive), beginning with "; "; empty for others.
 [[nodiscard]] std::string known_logger(const std::vector<std::string>& fields);
 
 /// Splits `line` at `separator`; quotes around a field are removed ("" inside them is one quote), and blanks around it.
@@ -77,8 +77,8 @@ class CsvRowReader {
   /// wrong number of fields, and a value beyond LogColumn::limit.
   RowOutcome read(std::string_view line, std::size_t line_number, bool terminated);
 
-  /// Columns (marks in the order of `names`) that may be missing: an empty, NaN or infinite field of theirs is then NaN, and no
-  /// reason to drop the row. For read_numbers().
+  /// Columns (marks in the order of `names`) that may be missing: an empty, NaN or infinite field of theirs is then
+  /// NaN, and no reason to drop the row. For read_numbers().
   void let_miss(std::vector<bool> columns);
 
   /// The first half of read(): false where the row was dropped (and counted); else row() has its numbers as they are

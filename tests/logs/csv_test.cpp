@@ -188,7 +188,8 @@ TEST_F(Csv, MapsAndExtraColumns) {
 }
 
 TEST_F(Csv, AFactorBehindAColumnsNameConvertsItsNumbers) {
-  // As VESC Tool writes them: ms of the day, electrical turns a minute, beyond what rad/s may be, an end without a name.
+  // As VESC Tool writes them: ms of the day, electrical turns a minute, beyond what rad/s may be, an end without a
+  // name.
   std::string text = "ms_today;erpm;q_axis_current;a*2;\n";
   for (int k = 0; k < 30; ++k) {
     text += fmt::format("{};{};\"-2.5\";{};\n", 36000000 + 20 * k, 42000 + k, k);
