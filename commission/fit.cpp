@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kConfidence = 0.95;   // of the statistical intervals
 constexpr double kUnexplained = 0.95;  // residual over effort, root mean square: a tenth of the square is explained
-constexpr double kBurst = 10.0;        // of a column over the root mean square of its noise
 constexpr double kRunAway = 3.0;  // ratio of simulated to measured speeds beyond which a simulation is no instrument
 
 // Root mean square of what the noise of the motion alone puts into each weighted column; zero where it is not known.
@@ -46,25 +45,6 @@ std::optional<identify::RegressionMoments> simulated_moments(LogSource& log, con
     return std::nullopt;
   }
   return sums;
-}
-
-// Columns that are no more than noise on the whole, and far more at times. Held at zero they leave these times
-// unexplained, so that bounds hold their noise by themselves.
-std::vector<bool> with_bursts(core::RegressionSource& rows, const Eigen::VectorXd& weights,
-                              const Eigen::VectorXd& noise) {
-  Eigen::VectorXd largest = Eigen::VectorXd::Zero(noise.size());
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
-    for (Eigen::Index r = 0; r < block.rows(); ++r) {
-      largest = largest.cwiseMax(weights[r % weights.size()] * block.Y.row(r).cwiseAbs().transpose());
-    }
-  }
-  std::vector<bool> burst;
-  for (Eigen::Index j = 0; j < noise.size(); ++j) {
-    burst.push_back(largest[j] > kBurst * noise[j]);
-  }
-  return burst;
 }
 
 std::vector<bool> flags(const std::vector<identify::ExcitationFinding>& findings) {
@@ -199,15 +179,12 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
       !fit.choice.candidates.empty() && fit.choice.chosen > 0 &&
       !(fit.choice.best().estimator == identify::Estimator::bias_compensated && s.motion_noise->upper_limit);
   judge_further(corrected ? Eigen::VectorXd() : column_noise(s, fit.weights));
-  std::vector<bool> bursts(s.model.p(), false);
   if (!s.motion_noise) {
     judge_unexplained(s.model, fit.residuals, fit.excitation);
-  } else if (flags(fit.excitation) != excluded) {
-    bursts = with_bursts(rows, fit.weights, column_noise(s, fit.weights));
   }
   fit.noise_alone = flags(fit.excitation);
   for (std::size_t j = 0; j < excluded.size(); ++j) {
-    fit.noise_alone[j] = fit.noise_alone[j] && !excluded[j] && !bursts[j];
+    fit.noise_alone[j] = fit.noise_alone[j] && !excluded[j];
   }
   if (flags(fit.excitation) != excluded) {
     excluded = flags(fit.excitation);
