@@ -65,18 +65,15 @@ int run(const Arguments& a) {
   options.outliers = a.outliers;
   options.persistence = a.persistence.value_or(detector::Persistence{});
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  Commissioning result;
-  try {
+  const Commissioning result = or_failure_page(a.common, context, [&] {
     logs::require_columns(log, robots::needed_columns(robot));
-    result = commission_robot(log, robot, options);
-    if (!result.model.facets.empty() && !a.common.out.empty()) {
-      context.own_log = detect(log, make_detector(result.model), {.most_points = report::most_chart_points});
-      context.seen = commission::first_look(log, result.model);
+    Commissioning found = commission_robot(log, robot, options);
+    if (!found.model.facets.empty() && !a.common.out.empty()) {
+      context.own_log = detect(log, make_detector(found.model), {.most_points = report::most_chart_points});
+      context.seen = commission::first_look(log, found.model);
     }
-  } catch (const Error& error) {
-    write_page(a.common, report::failure_report(error.what(), context));
-    throw;
-  }
+    return found;
+  });
   Json model = results::to_json(result, log.report(), results::software());
   if (!a.common.columns.empty()) {
     model["robot"]["columns"] = a.common.columns;

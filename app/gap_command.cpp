@@ -300,7 +300,7 @@ int run(const Arguments& a) {
   gap::NextDrive next;
   std::vector<std::string> naive;
   model::SimulatorChange change;
-  try {
+  or_failure_page(a.common, context, [&] {
     logs::require_columns(log, gap::required_columns(log, robot));
     if (healthy != nullptr) {
       logs::require_columns(*healthy, gap::required_columns(*healthy, robot));
@@ -316,10 +316,7 @@ int run(const Arguments& a) {
     if (!sources.empty()) {
       change = change_of(log, healthy, robot, diagnosis, options);
     }
-  } catch (const Error& error) {
-    write_page(a.common, report::failure_report(error.what(), context));
-    throw;
-  }
+  });
   for (std::vector<std::string>* texts : {&diagnosis.notes, &diagnosis.not_excited}) {
     for (std::string& text : *texts) {
       text = in_words(text, catalogue);

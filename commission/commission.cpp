@@ -400,13 +400,8 @@ bool withdrawn(const Commissioning& result) {
 
 // What makes a model that came out one of little use; empty where nothing does.
 std::string little_learned(const Commissioning& result) {
-  constexpr double kUseless = 1.0;  // |κ|: the fault is as large as the effort
   std::string text, open;
-  const bool tried = std::ranges::any_of(result.validation, [](const OutputValidation& v) { return v.instants > 0; });
-  const bool sees = std::ranges::any_of(result.validation, [](const OutputValidation& v) {
-    return v.instants > 0 && v.smallest_kappa > 0.0 && v.smallest_kappa <= kUseless;
-  });
-  if (tried && !sees) {
+  if (sees_nothing(result.validation)) {
     text =
         "no fault that scales the effort is certain to be seen on driving like this, since thresholds are as wide as "
         "the efforts";

@@ -171,13 +171,12 @@ struct NoiseDirections {
 // Takes these directions out of the fit of deviations from the nominal values.
 NoiseDirections hold_noise_directions(const Frame& s, const identify::LeastSquares& squares,
                                       const Eigen::VectorXd& noise, identify::LeastSquaresFit& fit) {
-  constexpr double kSignalOverNoise = 3.0;
   const Eigen::Index p = noise.size();
   const Eigen::MatrixXd factor = squares.factor() / std::sqrt(static_cast<double>(squares.instants()));
   const core::SingularValues svd =
       core::singular_values(factor.topLeftCorner(p, p) * noise.cwiseInverse().asDiagonal());
   const auto kept = static_cast<Eigen::Index>(
-      std::ranges::count_if(svd.values, [](double value) { return value >= kSignalOverNoise; }));
+      std::ranges::count_if(svd.values, [](double value) { return value >= identify::signal_over_noise; }));
   const Eigen::MatrixXd D = noise.cwiseInverse().asDiagonal() * svd.V;
   const Eigen::MatrixXd shares = svd.V.transpose() * noise.asDiagonal();  // D⁻¹
   NoiseDirections out{D.rightCols(p - kept), Eigen::VectorXd::Zero(p - kept), Eigen::VectorXd::Ones(p)};
@@ -219,6 +218,7 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
   filter::OdometryRows stream = make_rows(s, s.declared);
   FoldedSource rows(stream, part, s.log_rows, s.folds);
   OdometryFit fit;
+  NoiseDirections held;
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(rows.outputs()));
   for (int pass = 0; pass < 2; ++pass) {
     identify::LeastSquares squares(rows.parameters(), weights);
@@ -232,7 +232,6 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
       return std::nullopt;
     }
     std::vector<bool> excluded;
-    NoiseDirections held;
     const auto solve = [&] {
       fit.squares = squares.solve(excluded);
       if (s.rolled > 0.0 && excluded.empty()) {
@@ -258,13 +257,12 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
     }
     for (std::size_t j = 0; j < excluded.size() && held.most.size() > 0; ++j) {
       if (held.seen[static_cast<Eigen::Index>(j)] < kMostlySeen) {
-        fit.excitation[j].state = identify::Excitation::not_excited;
-        fit.excitation[j].reason = "its motion is no larger than what sensor noise alone would show";
+        identify::judge_noise_alone(fit.excitation[j]);
       }
     }
-    fit.untold = largest_untold(rows, held);
     weights = weights_of(fit.residuals);
   }
+  fit.untold = largest_untold(rows, held);
   fit.plausible = identify::largest_plausible_error(rows, fit.squares.estimate, fit.residuals, risk);
   return fit;
 }

@@ -13,6 +13,7 @@
 
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/filter/encoder.hpp>
+#include <wheelwright/identify/least_squares.hpp>
 
 namespace wheelwright::commission {
 namespace {
@@ -91,7 +92,8 @@ class Combination {
   }
   [[nodiscard]] Eigen::Vector2d weights() const {
     const core::SingularValues svd = core::singular_values(gram_);
-    if (svd.values[0] > 0.0 && svd.values[1] < 9.0 * noise_ * noise_ * static_cast<double>(rows_.size())) {
+    const double most = identify::signal_over_noise * noise_;
+    if (svd.values[0] > 0.0 && svd.values[1] < most * most * static_cast<double>(rows_.size())) {
       const Eigen::Vector2d main = svd.V.col(0);
       return main * (main.dot(moment_) / svd.values[0]);
     }

@@ -101,6 +101,22 @@ struct Running {
 
 }  // namespace
 
+std::optional<double> smallest_certain_kappa(const std::vector<OutputValidation>& validation) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const OutputValidation& v : validation) {
+    if (v.instants > 0 && v.smallest_kappa > 0.0) {
+      least = std::min(least, v.smallest_kappa);
+    }
+  }
+  return std::isfinite(least) ? std::optional(least) : std::nullopt;
+}
+
+bool sees_nothing(const std::vector<OutputValidation>& validation) {
+  const bool tried = std::ranges::any_of(validation, [](const OutputValidation& v) { return v.instants > 0; });
+  const std::optional<double> kappa = smallest_certain_kappa(validation);
+  return tried && !(kappa && *kappa <= whole_effort);
+}
+
 std::vector<OutputValidation> validate_on(core::RegressionSource& rows, const detector::ThresholdRule& rule) {
   const detector::ThresholdRule box(rule.set(), rule.estimate(), detector::ParameterSetKind::box);
   const std::size_t p = rows.parameters();

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include <wheelwright/core/regression.hpp>
@@ -58,6 +59,15 @@ struct OutputValidation {
   double smallest_kappa = 0.0;  ///< smallest |κ| of ζ = κ·Yθ that some instant shows for certain, both directions
   core::Warrant warrant = core::Warrant::extrapolated;  ///< of the threshold that was tried
 };
+
+/// |κ| of a fault that is as large as the effort itself.
+inline constexpr double whole_effort = 1.0;
+
+/// Smallest |κ| over the outputs that held-out driving shows for certain; nothing where it shows none.
+[[nodiscard]] std::optional<double> smallest_certain_kappa(const std::vector<OutputValidation>& validation);
+
+/// Whether driving was held out and shows no fault for certain that is smaller than the effort itself.
+[[nodiscard]] bool sees_nothing(const std::vector<OutputValidation>& validation);
 
 /// Walks `rows` and compares every instant with its threshold. κ: an instant shows ζ = κ·Yθ for certain when
 /// |κ|·min|Yθ| exceeds u − l, the minimum taken over the feasible set; a constant change δ1 of the wheel radius r has κ

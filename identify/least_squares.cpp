@@ -204,9 +204,13 @@ ResidualSummary ResidualStatistics::summary(const Eigen::MatrixXd& inverse_gram)
 namespace {
 
 constexpr double kCollinear = 1e-7;  // of the column's own size
-constexpr double kSignalOverNoise = 3.0;
 
 }  // namespace
+
+void judge_noise_alone(ExcitationFinding& finding) {
+  finding.state = Excitation::not_excited;
+  finding.reason = "its motion is no larger than what sensor noise alone would show";
+}
 
 std::vector<ExcitationFinding> judge_excitation(const LeastSquaresFit& fit, const Eigen::VectorXd& standard_error,
                                                 double t_quantile, const Eigen::VectorXd& noise_rms) {
@@ -221,9 +225,8 @@ std::vector<ExcitationFinding> judge_excitation(const LeastSquaresFit& fit, cons
     } else if (fit.partial_rms[j] <= kCollinear * fit.column_rms[j]) {
       f.state = Excitation::not_excited;
       f.reason = "its motion always comes together with that of another parameter";
-    } else if (fit.partial_rms[j] < kSignalOverNoise * f.noise_rms) {
-      f.state = Excitation::not_excited;
-      f.reason = "its motion is no larger than what sensor noise alone would show";
+    } else if (fit.partial_rms[j] < signal_over_noise * f.noise_rms) {
+      judge_noise_alone(f);
     } else if (std::abs(fit.estimate[j]) < t_quantile * standard_error[j]) {
       f.state = Excitation::indistinct;
       f.reason = "it cannot be told from zero on this log";

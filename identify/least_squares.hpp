@@ -116,6 +116,12 @@ struct ExcitationFinding {
   std::string reason;       ///< one sentence for people, empty when identified
 };
 
+/// A column holds motion from this multiple on of the root mean square of what noise alone would put there.
+inline constexpr double signal_over_noise = 3.0;
+
+/// Makes `finding` that of a parameter whose column is no more than noise.
+void judge_noise_alone(ExcitationFinding& finding);
+
 /// Judges each parameter. `noise_rms` (p, or empty): root mean square of sensor noise in each weighted column;
 /// `standard_error` (p) and its t quantile for 95 %.
 ///

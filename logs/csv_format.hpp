@@ -40,10 +40,6 @@ struct CsvHeader {
   std::map<std::string, double> factors;     ///< wanted name -> FACTOR of its field, where it has one
 };
 
-/// What to write where `fields` are those of a known program's log that names no columns of the log contract (VESC
-/// Tool, ODrive), beginning with "; "; empty for others.
-[[nodiscard]] std::string known_logger(const std::vector<std::string>& fields);
-
 /// Splits `line` at `separator`; quotes around a field are removed ("" inside them is one quote), and blanks around it.
 [[nodiscard]] std::vector<std::string> split_fields(std::string_view line, char separator);
 

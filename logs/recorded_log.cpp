@@ -11,7 +11,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/csv_format.hpp>
+#include <wheelwright/logs/known_logger.hpp>
 
 namespace wheelwright::logs {
 namespace {

@@ -303,7 +303,7 @@ std::string page(const PageContent& content) {
   out += "</style>\n</head>\n<body>\n<header>\n<h1>" + escape(content.title) + "</h1>\n";
   out += navigation(content.sections) + "</header>\n<main>\n";
   out += fmt::format("<section id=\"result\" class=\"result {}\"><p class=\"verdict\">{}</p>\n", content.status,
-                     escape(content.verdict));
+                     escape_with_code(content.verdict));
   if (content.warrant) {
     out += warrant_note(*content.warrant);
   }

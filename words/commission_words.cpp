@@ -261,11 +261,14 @@ std::string held_out(const Commissioning& result) {
 }
 
 std::string sees(const Commissioning& result) {
-  const std::optional<double> kappa = smallest_certain_kappa(result);
+  const std::optional<double> kappa = commission::smallest_certain_kappa(result.validation);
   if (!kappa) {
     return "On this driving no change of scale, however large, is certain to be seen: the thresholds are wider than "
-           "all "
-           "that the robot did.";
+           "all that the robot did.";
+  }
+  if (*kappa > commission::whole_effort) {
+    return "On this driving no change of scale that is smaller than the forces themselves is certain to be seen: the "
+           "thresholds are wider than they.";
   }
   if (model::on_two_wheels(result.model.robot)) {
     return fmt::format(
@@ -401,7 +404,9 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
   }
   out.push_back(footing(result));
   out.push_back(held_out(result));
-  out.push_back(sees(result) + (smallest_certain_kappa(result) && result.model.warrant != core::Warrant::guaranteed
+  const std::optional<double> kappa = commission::smallest_certain_kappa(result.validation);
+  const bool nothing = commission::sees_nothing(result.validation);
+  out.push_back(sees(result) + (kappa && !nothing && result.model.warrant != core::Warrant::guaranteed
                                     ? " " + certain_meaning(result.model.warrant)
                                     : ""));
   for (std::string text : {at_risk(result), pose_at_risk(result)}) {
@@ -418,7 +423,7 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
         fmt::format("The threshold of {} is much wider than its residual and can hardly fire: declared noise "
                     "bounds that are smaller, where the sensors allow it, would tighten it.",
                     core::enumerated(idle)));
-  } else if (smallest_certain_kappa(result).value_or(coarse_kappa) >= coarse_kappa) {
+  } else if (!nothing && kappa.value_or(coarse_kappa) >= coarse_kappa) {
     out.emplace_back(
         "Only coarse faults are certain to be seen: a longer log with stronger acceleration and tighter curves, or a "
         "quieter effort signal, would narrow the thresholds; `wheelwright design --for bounds` plans such a drive.");
@@ -428,21 +433,6 @@ std::vector<std::string> words_with_model(const Commissioning& result) {
 
 }  // namespace
 
-std::optional<double> smallest_certain_kappa(const Commissioning& result) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const commission::OutputValidation& v : result.validation) {
-    if (v.instants > 0 && v.smallest_kappa > 0.0) {
-      least = std::min(least, v.smallest_kappa);
-    }
-  }
-  return std::isfinite(least) ? std::optional(least) : std::nullopt;
-}
-
-bool sees_nothing(const Commissioning& result) {
-  constexpr double useless_kappa = 1.0;
-  return held_out_instants(result) > 0 && !(smallest_certain_kappa(result).value_or(INFINITY) <= useless_kappa);
-}
-
 double radius_change(double kappa) { return std::sqrt(1.0 + kappa) - 1.0; }
 
 Standing standing(const Commissioning& result) {
@@ -450,14 +440,14 @@ Standing standing(const Commissioning& result) {
     return Standing::bad;
   }
   const bool clean = result.status == Status::done && held_out_instants(result) > 0 && false_alarms(result) == 0 &&
-                     smallest_certain_kappa(result).value_or(coarse_kappa) < coarse_kappa &&
+                     commission::smallest_certain_kappa(result.validation).value_or(coarse_kappa) < coarse_kappa &&
                      idle_outputs(result).empty();
   return clean ? Standing::good : Standing::caution;
 }
 
 std::string verdict(const Commissioning& result) {
   const std::string instead =
-      sees_nothing(result)
+      commission::sees_nothing(result.validation)
           ? " No fault is certain to be seen on driving like this: speed up and brake, drive curves to "
             "both sides (`wheelwright design --for bounds` plans such a drive), and commission again."
           : "";

@@ -57,12 +57,6 @@ struct ParameterViews {
 /// Unit of output `i` with the effort that was used; empty where the model has none.
 [[nodiscard]] std::string output_unit_of(const Robot& robot, const Model& model, std::size_t i);
 
-/// Smallest |κ| over the outputs that held-out driving shows for certain; nothing where it shows none.
-[[nodiscard]] std::optional<double> smallest_certain_kappa(const Commissioning& result);
-
-/// Whether the held-out driving shows no fault for certain that is smaller than the effort itself (|κ| ≤ 1).
-[[nodiscard]] bool sees_nothing(const Commissioning& result);
-
 /// |δ1|/r = √(1 + κ) − 1: the growth of both wheel radii that ζ = κ·Yθ means.
 [[nodiscard]] double radius_change(double kappa);
 

@@ -137,12 +137,11 @@ std::string reach_lines(const Commissioning& r) {
 }  // namespace
 
 std::string smallest_fault(const Robot& robot, double kappa) {
-  constexpr double useless = 1.0;
-  if (!std::isfinite(kappa) || kappa > useless) {
+  if (!(kappa <= commission::whole_effort)) {
     return "no fault that scales the effort is certainly seen: the threshold is as wide as the effort itself";
   }
   const std::string change = model::on_two_wheels(robot)
-                                 ? fmt::format("the wheel radius by {:.2g} %", 100.0 * (std::sqrt(1.0 + kappa) - 1.0))
+                                 ? fmt::format("the wheel radius by {:.2g} %", 100.0 * radius_change(kappa))
                                  : fmt::format("the effort by {:.2g} %", 100.0 * kappa);
   return "a change of " + change + " is certainly seen at the best moment";
 }

@@ -124,6 +124,14 @@ TEST(CommissionWords, FalseAlarmsAndIdleThresholdsAreNotPraised) {
   blind.status = Commissioning::Status::partial;
   EXPECT_THAT(verdict(blind), AllOf(HasSubstr("in part"), HasSubstr("No fault is certain"), HasSubstr("design")));
 
+  Commissioning wide = example::done();
+  for (commission::OutputValidation& v : wide.validation) {
+    v.smallest_kappa = 1469.0;
+  }
+  EXPECT_THAT(spoken(wide), AllOf(HasSubstr("no change of scale that is smaller"), Not(HasSubstr("coarse")),
+                                  Not(HasSubstr("The smallest change"))));
+  EXPECT_THAT(verdict(wide), HasSubstr("No fault is certain to be seen"));
+
   Commissioning coarse = example::done();
   for (commission::OutputValidation& v : coarse.validation) {
     v.smallest_kappa = 0.97;
