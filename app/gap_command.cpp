@@ -48,7 +48,7 @@ constexpr std::array<SimulatorOption, 3> kSimulators = {
       "Write a copy of this Gazebo file (SDF) with the causes in it into --out"}}};
 
 struct Arguments {
-  std::vector<std::filesystem::path> logs, baseline, fresh;
+  std::vector<std::filesystem::path> logs, baseline, simulated, fresh;
   std::array<std::filesystem::path, kSimulators.size()> simulators;  // empty: none of this format
   robots::SimulatorHints wheels;
   std::filesystem::path robot;
@@ -67,6 +67,8 @@ constexpr const char* kHelp =
     "would tell.\n\n"
     "A baseline is a log of the same robot when it was healthy: parameters and noise are learnt from it, and what it "
     "shows already is no news. Without one, the nominal values of the robot file are believed.\n\n"
+    "A log of your own simulator, given the same commands (--sim), takes the place of the model: then the gap is the "
+    "robot's from that simulator.\n\n"
     "What is found goes back into the file of your own simulator (--write-mjcf, --write-urdf, --write-sdf): masses, "
     "friction, geometry, gains and limits are edited, everything else stays byte for byte, and causes that such a file "
     "has no number for are named with what to do instead.";
@@ -74,6 +76,7 @@ constexpr const char* kHelp =
 constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright gap drive.csv --robot robot.yaml --baseline healthy.csv --out gap\n"
+    "  wheelwright gap drive.csv --robot robot.yaml --sim simulated.csv --write-mjcf robot.xml --out gap\n"
     "  wheelwright gap monday.csv tuesday.csv --robot robot.yaml --without slope --json > gap.json\n"
     "  then wheelwright commission drive.csv --robot gap/robot_improved.yaml --out result\n"
     "  wheelwright gap drive.csv --robot robot.yaml --write-mjcf robot.xml --out gap   # writes "
@@ -279,8 +282,9 @@ int run(const Arguments& a) {
   check_without(a.without, catalogue);
   const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::hidden);
   logs::RecordedLog& log = *opened.log;
+  const std::vector<std::filesystem::path>& reference = a.simulated.empty() ? a.baseline : a.simulated;
   const SoundLog baseline =
-      a.baseline.empty() ? SoundLog{} : open_sound_log(a.baseline, robot, a.common, WheelPose::hidden);
+      reference.empty() ? SoundLog{} : open_sound_log(reference, robot, a.common, WheelPose::hidden);
   logs::RecordedLog* const healthy = baseline.log.get();
   robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
   report::ReportContext context = report_context(a.common, log.report(), log);
@@ -293,6 +297,7 @@ int run(const Arguments& a) {
   options.without = a.without;
   options.beta = a.beta;
   options.shrink = !a.no_shrink;
+  options.baseline_simulated = !a.simulated.empty();
   options.seed = a.common.seed;
   options.threads = static_cast<std::size_t>(a.common.threads);
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
@@ -335,6 +340,7 @@ int run(const Arguments& a) {
   names.robot = a.robot.string();
   names.logs = names_of_files(a.logs);
   names.baseline = fmt::format("{}", fmt::join(names_of_files(a.baseline), ", "));
+  names.simulator = fmt::format("{}", fmt::join(names_of_files(a.simulated), ", "));
   names.residuals = files ? kResiduals : "";
   names.software = results::software();
   if (next.commands) {
@@ -380,6 +386,14 @@ Run add_gap(CLI::App& program) {
       ->expected(1)
       ->allow_extra_args(false)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command
+      .add_option("--sim", a->simulated,
+                  "Log of your simulator under the same commands: the gap is from it (may be repeated)")
+      ->type_name("LOG")
+      ->expected(1)
+      ->allow_extra_args(false)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->excludes("--baseline");
   command
       .add_option("--fresh", a->fresh, "Another log of the robot as it is now: whether what is promised holds there")
       ->type_name("LOG")

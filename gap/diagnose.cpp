@@ -325,7 +325,7 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   SelectionOptions selection = options.selection;
   selection.threads = options.threads;
   selection.seed = options.seed;
-  if (!prepared.healthy_drive) {
+  if (prepared.reference != GapReference::healthy_log) {
     selection.tolerated_floor = std::max(selection.tolerated_floor, options.sensor_floor);
   }
   const Robot& seen = prepared.view.robot;
@@ -360,7 +360,9 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   result.verdict = verdict_of(found, result.credible.size());
   result.beta = prepared.row_options.beta;
   result.floor_origin = prepared.floor_origin;
-  result.floor_error = prepared.healthy_drive ? 0.0 : std::sqrt(1.0 + options.sensor_floor) - 1.0;
+  result.reference = prepared.reference;
+  result.floor_error =
+      prepared.reference == GapReference::healthy_log ? 0.0 : std::sqrt(1.0 + options.sensor_floor) - 1.0;
   result.notes = prepared.notes;
   if (!found.enough_blocks) {
     result.notes.push_back(

@@ -28,9 +28,11 @@ struct DiagnoseOptions {
   BlockOptions blocks;         ///< of time, for held-out errors
   SelectionOptions selection;
   double sensor_floor =
-      1.5;             ///< SelectionOptions::tolerated_floor without a baseline: what the sensors show of their noise
-                       ///< (quantisation, rounding, correlated errors left out) is a floor of this much error
-  bool shrink = true;  ///< whether it is measured how far the gap shrinks (most of the time)
+      1.5;  ///< SelectionOptions::tolerated_floor without a healthy log: what the sensors show of their noise
+            ///< (quantisation, rounding, correlated errors left out) is a floor of this much error
+  bool baseline_simulated = false;  ///< the baseline is a log of a simulator: it says what the model is that the robot
+                                    ///< is compared with, and nothing of the robot's sensors
+  bool shrink = true;               ///< whether it is measured how far the gap shrinks (most of the time)
   std::uint64_t seed = 1;
   std::size_t threads = 1;                                             ///< the result does not depend on it
   std::function<void(std::string_view stage, double share)> progress;  ///< may be empty
@@ -41,9 +43,11 @@ struct DiagnoseOptions {
 [[nodiscard]] std::vector<std::string> required_columns(const LogSource& log, const Robot& robot);
 
 /// Diagnoses `log` against the model of `robot`. With `baseline`, a log of the healthy robot, its θ is the nominal one
-/// and what it leaves is the noise floor; effects that the healthy robot has already are taken as known. Without, θ is
-/// nominal as far as the robot file says, and the floor is made of the sensors' noise. Throws InputError or
-/// InvalidArgument for a log or robot that cannot be used at all; what the data say is in the result.
+/// and what it leaves is the noise floor; effects that the healthy robot has already are taken as known. So are θ and
+/// effects of a simulator (`baseline_simulated`), of which the floor is what its log leaves beside the noise of the
+/// sensors of `log`. Without a baseline θ is nominal as far as the robot file says, and the floor is made of the
+/// sensors' noise. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; what the data say
+/// is in the result.
 [[nodiscard]] Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot,
                                  const DiagnoseOptions& options = {});
 

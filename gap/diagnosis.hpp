@@ -28,6 +28,13 @@ enum class GapVerdict {
   unexplained,  ///< what the best cause leaves is above the floor
 };
 
+/// What the robot of the log is compared with.
+enum class GapReference {
+  robot_file,   ///< the model with the nominal values of the robot file; those that it lacks are fitted to the log
+  healthy_log,  ///< the model as fitted to a log of the healthy robot
+  simulator,    ///< the model as fitted to a simulator's log: what that simulator does
+};
+
 /// A number with its 95 % interval.
 struct GapEstimate {
   std::string name;
@@ -126,12 +133,13 @@ struct Diagnosis {
   GapShrink shrink;
   std::vector<ParameterShift> parametric;
   std::vector<Contradiction> contradictions;
-  double gap = 0.0;          ///< what the nominal model leaves above the floor, share of the efforts' mean square
-  double structural = 0.0;   ///< the part of it that stays after θ is fitted again
-  double remaining = 0.0;    ///< share of the gap that the causes leave
-  double floor_error = 0.0;  ///< relative error of the floor
-  std::string floor_origin;  ///< where the floor is from, in words
-  double beta = 0.0;         ///< of the filter, 1/s
+  GapReference reference = GapReference::robot_file;
+  double gap = 0.0;                      ///< what `reference` leaves above the floor, share of the efforts' mean square
+  double structural = 0.0;               ///< the part of it that stays after θ is fitted again
+  double remaining = 0.0;                ///< share of the gap that the causes leave
+  double floor_error = 0.0;              ///< relative error of the floor
+  std::string floor_origin;              ///< where the floor is from, in words
+  double beta = 0.0;                     ///< of the filter, 1/s
   std::vector<std::string> not_excited;  ///< effects that this log could not show, with what to drive
   std::vector<std::string> notes;
   std::vector<ResidualSeries> series;  ///< for pictures

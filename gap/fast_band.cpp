@@ -275,7 +275,7 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
   FastBand found;
   found.beta = std::min(options.beta, kMostOfAStep / drive.step);
   const Band band{prepared.row_options.beta, found.beta};
-  if (!prepared.healthy_drive || !drive.has_efforts || band.fast < kWide * band.slow) {
+  if (prepared.reference != GapReference::healthy_log || !drive.has_efforts || band.fast < kWide * band.slow) {
     return std::nullopt;
   }
   const Drive& healthy = *prepared.healthy_drive;

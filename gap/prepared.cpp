@@ -344,13 +344,45 @@ FittedEffect timing_of(const Drive& drive, const GapRows& rows, std::vector<Eige
   return {timing, {}, Eigen::VectorXd::Constant(1, delay)};
 }
 
-// θ, floor and effects of the healthy robot.
+// What the sensors' noise makes of the rows of the log, and its origin in words.
+void floor_by_sensors(PreparedGap& prepared) {
+  const Drive& drive = prepared.drive;
+  prepared.floor = without_efforts(noise_floor(drive, signal_noise(drive), prepared.row_options.beta), drive);
+  prepared.floor_origin = "the noise of the sensors, found from the log's own differences";
+  const Windows windows = make_windows(drive, prepared.row_options.window);
+  const IncrementNoise repeated = repeatability(drive, windows, pose_gap(drive, windows));
+  IncrementNoise& increments = prepared.floor.increments;
+  if (repeated.yaw > increments.yaw || repeated.forward > increments.forward || repeated.lateral > increments.lateral) {
+    increments = {std::max(increments.forward, repeated.forward), std::max(increments.lateral, repeated.lateral),
+                  std::max(increments.yaw, repeated.yaw)};
+    prepared.floor_origin += "; of the pose also how much it differs where the wheels did the same again";
+  }
+}
+
+// Root of the sum of squares, channel by channel; channels that one of them lacks have none.
+NoiseFloor together(const NoiseFloor& a, const NoiseFloor& b) {
+  const auto both = [](double x, double y) { return x > 0.0 && y > 0.0 ? std::hypot(x, y) : 0.0; };
+  NoiseFloor sum;
+  sum.efforts = (a.efforts.array().square() + b.efforts.array().square()).sqrt();
+  sum.increments = {both(a.increments.forward, b.increments.forward), both(a.increments.lateral, b.increments.lateral),
+                    both(a.increments.yaw, b.increments.yaw)};
+  return sum;
+}
+
+// θ, floor and effects of the healthy robot, or of the simulator.
 void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   Drive& drive = *prepared.healthy_drive;
   const double beta = prepared.row_options.beta;
+  const bool simulated = options.baseline_simulated;
   prepared.theta = fit_base(drive, beta);
   predict_efforts(drive, prepared.theta);
-  const NoiseFloor sensors = without_efforts(noise_floor(drive, signal_noise(drive), beta), drive);
+  NoiseFloor sensors = without_efforts(noise_floor(drive, signal_noise(drive), beta), drive);
+  if (simulated) {
+    // What the simulator has below the noise of the robot's sensors is nothing to them.
+    predict_efforts(prepared.drive, prepared.theta);
+    floor_by_sensors(prepared);
+    sensors = together(sensors, prepared.floor);
+  }
   GapProblem problem = make_problem(drive, sensors, {}, std::vector<bool>(drive.model.p(), false), prepared.catalogue,
                                     all_shapes(prepared.catalogue, drive), prepared.row_options);
   BlockOptions blocks = options.blocks;
@@ -365,21 +397,27 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   prepared.theta += fit.coefficients.head(prepared.theta.size());
   prepared.healthy = fitted_effects(problem.table, found.structural, fit, prepared.catalogue);
   std::vector<Eigen::VectorXd> left = residuals(problem.rows, subset, fit.coefficients);
-  prepared.healthy.push_back(timing_of(drive, problem.rows, left, prepared.row_options));
+  const FittedEffect timing = timing_of(drive, problem.rows, left, prepared.row_options);
   // Held out, as the errors of other logs are that are measured by it.
   const double held_out = std::sqrt(std::max(fit.held_out_error / std::max(fit.mean_square, 1e-300), 1.0));
   for (Eigen::VectorXd& rows : left) {
     rows *= held_out;
   }
-  prepared.floor = without_efforts(floor_of(left, problem.rows), drive);
-  prepared.floor_origin = "what the model leaves of the healthy log";
+  const NoiseFloor floor = without_efforts(floor_of(left, problem.rows), drive);
   for (const FittedEffect& effect : prepared.healthy) {
-    if (effect.effect.name == kTiming) {
-      continue;
-    }
-    prepared.notes.push_back("the healthy log shows " + effect.effect.name +
+    prepared.notes.push_back((simulated ? "the simulator has " : "the healthy log shows ") + effect.effect.name +
                              " already: what is reported is in addition to it");
   }
+  if (simulated) {
+    prepared.reference = GapReference::simulator;
+    prepared.floor = together(floor, prepared.floor);
+    prepared.floor_origin += ", and what the model leaves of the simulator's log";
+    return;
+  }
+  prepared.healthy.push_back(timing);
+  prepared.floor = floor;
+  prepared.reference = GapReference::healthy_log;
+  prepared.floor_origin = "what the model leaves of the healthy log";
 }
 
 }  // namespace
@@ -564,7 +602,9 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
       throw InputError("the healthy log has efforts and the other one has none: log them in both, or leave them out");
     }
   }
-  const Drive& reference = prepared.healthy_drive ? *prepared.healthy_drive : prepared.drive;
+  // The filter is for the noise of the robot's sensors.
+  const bool healthy = prepared.healthy_drive && !options.baseline_simulated;
+  const Drive& reference = healthy ? *prepared.healthy_drive : prepared.drive;
   const double wish = options.beta ? *options.beta : kUsualBeta;
   prepared.row_options.beta = options.beta ? *options.beta : choose_gap_beta(reference, signal_noise(reference), wish);
   if (prepared.healthy_drive) {
@@ -583,17 +623,7 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
     }
   }
   predict_efforts(prepared.drive, prepared.theta);
-  prepared.floor = without_efforts(noise_floor(prepared.drive, signal_noise(prepared.drive), prepared.row_options.beta),
-                                   prepared.drive);
-  prepared.floor_origin = "the noise of the sensors, found from the log's own differences";
-  const Windows windows = make_windows(prepared.drive, prepared.row_options.window);
-  const IncrementNoise repeated = repeatability(prepared.drive, windows, pose_gap(prepared.drive, windows));
-  IncrementNoise& increments = prepared.floor.increments;
-  if (repeated.yaw > increments.yaw || repeated.forward > increments.forward || repeated.lateral > increments.lateral) {
-    increments = {std::max(increments.forward, repeated.forward), std::max(increments.lateral, repeated.lateral),
-                  std::max(increments.yaw, repeated.yaw)};
-    prepared.floor_origin += "; of the pose also how much it differs where the wheels did the same again";
-  }
+  floor_by_sensors(prepared);
   return prepared;
 }
 

@@ -12,6 +12,7 @@
 
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/gap/diagnose.hpp>
+#include <wheelwright/gap/diagnosis.hpp>
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/effort_units.hpp>
 #include <wheelwright/gap/gap_rows.hpp>
@@ -47,17 +48,18 @@ struct SignalNoise {
 
 /// A log ready for the search.
 struct PreparedGap {
-  TorqueView view;                ///< of the robot: all that follows is in its units
-  std::vector<Effect> catalogue;  ///< that is looked for
-  LogTable log;                   ///< the log as it was read, with torques
-  std::optional<LogTable> baseline_log;
-  Drive drive;  ///< of the log, with its nominal θ
-  std::optional<Drive> healthy_drive;
-  Eigen::VectorXd theta;              ///< p, nominal where `trusted`, else as fitted to the log
-  std::vector<bool> trusted;          ///< p
-  std::vector<FittedEffect> healthy;  ///< of the baseline's robot
+  TorqueView view;                       ///< of the robot: all that follows is in its units
+  std::vector<Effect> catalogue;         ///< that is looked for
+  LogTable log;                          ///< the log as it was read, with torques
+  std::optional<LogTable> baseline_log;  ///< of the healthy robot, or of a simulator
+  Drive drive;                           ///< of the log, with its nominal θ
+  std::optional<Drive> healthy_drive;    ///< of baseline_log
+  Eigen::VectorXd theta;                 ///< p, nominal where `trusted`, else as fitted to the log
+  std::vector<bool> trusted;             ///< p
+  std::vector<FittedEffect> healthy;     ///< of the baseline's robot or simulator
   NoiseFloor floor;
   std::string floor_origin;  ///< in words
+  GapReference reference = GapReference::robot_file;
   GapRowOptions row_options;
   std::vector<std::string> notes;
 };

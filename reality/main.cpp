@@ -118,7 +118,7 @@ int generate(const Request& request, std::uint64_t first, std::uint64_t cases, u
 /// What `replay` is asked for.
 struct ReplayRequest {
   std::vector<fs::path> logs, simulators;
-  fs::path gap, out;
+  fs::path gap, out, log;
   ReplayOptions options;
 };
 
@@ -186,6 +186,9 @@ int run_replay(ReplayRequest request) {
   if (!request.out.empty()) {
     files::write_json(request.out, result);
   }
+  if (!request.log.empty()) {
+    logs::write_csv(request.log, all.front().simulated);
+  }
   return 0;
 }
 
@@ -234,6 +237,7 @@ int main(int count, char** arguments) try {
       ->check(CLI::Range(0.05, 60.0))
       ->capture_default_str();
   again.add_option("--out", replayed.out, "the same as JSON");
+  again.add_option("--log", replayed.log, "what the first simulator did at the log's speeds, as a log (CSV)");
   Request request;
   std::uint64_t cases = 0;
   std::uint64_t first = 0;

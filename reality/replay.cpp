@@ -198,6 +198,20 @@ class Runner {
     return values[k] + part * (values[k + 1] - values[k]);
   }
 
+  // The state as it is, as row k of `log`.
+  void add_row(std::size_t k, LogTable& log) {
+    const double* const quat = q() + base_q_ + 3;
+    log.t.push_back(t_[k]);
+    log.columns[0].push_back(v()[dof_[right]]);
+    log.columns[1].push_back(v()[dof_[left]]);
+    log.columns[4].push_back(q()[base_q_]);
+    log.columns[5].push_back(q()[base_q_ + 1]);
+    const std::vector<double>& before = log.columns[6];
+    const double heading = heading_of(quat);
+    const double last = before.empty() ? heading_[k] : before.back();
+    log.columns[6].push_back(last + std::remainder(heading - last, 2.0 * std::numbers::pi));
+  }
+
   void torques(Replay& out) {
     const double h = model_->opt.timestep;
     const double stiffness = kStiffness * 0.5 * mass_ * radius_ * radius_ / h;
@@ -207,12 +221,18 @@ class Runner {
     for (std::vector<double>& one : needed) {
       one.assign(t_.size(), 0.0);
     }
+    out.simulated.names = {"omega_r", "omega_l", "tau_r", "tau_l", "x", "y", "theta"};
+    out.simulated.columns.resize(out.simulated.names.size());
     set_state(0);
     for (std::size_t k = 0; k + 1 < t_.size(); ++k) {
-      if (k > 0 && starts_[k]) {
+      if (starts_[k]) {
         set_state(k);
+        out.simulated.segment_starts.push_back(k);
       }
       for (std::size_t n = 0; n < inside; ++n) {
+        if (n == inside / 2) {
+          add_row(k, out.simulated);
+        }
         const double place = static_cast<double>(k) - 0.5 + static_cast<double>(n) / static_cast<double>(inside);
         for (std::size_t i = 0; i < 2; ++i) {
           // The servo follows with a lag of h/kStiffness; it is given what comes then.
@@ -223,6 +243,8 @@ class Runner {
         }
         mj_step(model_.get(), data_.get());
       }
+      out.simulated.columns[2].push_back(needed[right][k]);
+      out.simulated.columns[3].push_back(needed[left][k]);
     }
     compare(needed, out);
   }

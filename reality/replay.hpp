@@ -32,6 +32,9 @@ struct Replay {
   double wheel_radius = 0.0, track_width = 0.0;  ///< by which wheel speeds were read, m
   std::size_t rows = 0;                          ///< of the torque
   std::size_t runs = 0;
+  /// What the simulator did while its wheels were held at the log's speeds: a log of it under the same commands (t,
+  /// omega_r, omega_l, tau_r, tau_l, x, y, theta; SI units). The last row of the log is not in it.
+  LogTable simulated;
 };
 
 /// Runs the robot of `xml`, which stands on a ground at height 0 and has one free joint, along `log` (omega_r, omega_l,

@@ -36,6 +36,15 @@ std::string channel_title(const gap::ResidualSeries& s) {
                                            : "Pose against wheel odometry, " + spaced(s.channel);
 }
 
+const char* reference_words(gap::GapReference reference) {
+  switch (reference) {
+    case gap::GapReference::robot_file: return "the model with its nominal parameters";
+    case gap::GapReference::healthy_log: return "the model of the healthy robot";
+    case gap::GapReference::simulator: return "the model of the simulator";
+  }
+  return "";
+}
+
 std::string p_words(double p) { return p < 0.001 ? "< 0.001" : decimal(p, 3); }
 
 std::string causes_section(const Diagnosis& d) {
@@ -53,11 +62,10 @@ std::string causes_section(const Diagnosis& d) {
                     "<code>" + escape(cause.effect) + "</code>", numeric(percent(cause.share)), parameters});
   }
   return table({"Cause", "name", numeric("share of<br>the gap"), "parameters [95 % interval]"}, rows) +
-         note(fmt::format(
-             "The gap is what the model with its nominal parameters leaves above the noise floor: {} of the "
-             "efforts' mean square, {} after fitting θ again; the causes leave {} of the gap. Floor: {}.",
-             percent(d.gap), percent(d.structural), percent(d.remaining),
-             escape(d.floor_origin.empty() ? "unknown" : d.floor_origin)));
+         note(fmt::format("The gap is what {} leaves above the noise floor: {} of the "
+                          "efforts' mean square, {} after fitting θ again; the causes leave {} of the gap. Floor: {}.",
+                          reference_words(d.reference), percent(d.gap), percent(d.structural), percent(d.remaining),
+                          escape(d.floor_origin.empty() ? "unknown" : d.floor_origin)));
 }
 
 std::string apart_section(const Diagnosis& d, const std::string& next_manoeuvre) {

@@ -147,6 +147,7 @@ Json to_json(const Diagnosis& d, const GapFiles& files) {
           {"robot", files.robot},
           {"logs", files.logs},
           {"baseline", files.baseline.empty() ? Json(nullptr) : Json(files.baseline)},
+          {"simulator", files.simulator.empty() ? Json(nullptr) : Json(files.simulator)},
           {"residuals", files.residuals.empty() ? Json(nullptr) : Json(files.residuals)},
           {"software", files.software}};
 }

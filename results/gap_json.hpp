@@ -28,7 +28,8 @@ struct NextManoeuvre {
 struct GapFiles {
   std::string robot;              ///< the robot file as it was named
   std::vector<std::string> logs;  ///< the logs as they were named
-  std::string baseline;           ///< empty: none
+  std::string baseline;           ///< of the healthy robot; empty: none
+  std::string simulator;          ///< the simulator's log; empty: none
   std::string residuals;          ///< file of write_residuals(); empty: none
   std::optional<NextManoeuvre> next_manoeuvre;
   std::string software;  ///< name and version

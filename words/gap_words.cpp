@@ -111,6 +111,17 @@ std::string where_sentence(const Diagnosis& d) {
                         : "What fitting θ again cannot remove is concentrated at: " + core::enumerated(places) + ".";
 }
 
+// How far the simulator is from the robot, and the robot's own model beside it.
+std::string simulator_sentence(const Diagnosis& d) {
+  if (d.reference != gap::GapReference::simulator || pose_alone(d)) {
+    return {};
+  }
+  return fmt::format(
+      "The simulator leaves {} of the mean square of the robot's efforts above the noise; the model of the robot file, "
+      "fitted to the robot's log, leaves {}.",
+      percent(d.gap), percent(d.structural));
+}
+
 std::vector<std::string> credible_names(const Diagnosis& d) {
   std::vector<std::string> names;
   for (const gap::CredibleCauses& c : d.credible) {
@@ -187,6 +198,8 @@ std::string gap_verdict(const Diagnosis& d) {
     case GapVerdict::no_gap:
       return pose_alone(d)
                  ? "No gap in the pose: it is what the wheels say, to the noise floor; of the torque nothing is known."
+             : d.reference == gap::GapReference::simulator
+                 ? "No gap: the simulator needs the efforts that the robot needed, to the noise floor."
                  : "No gap: the model explains the log to the noise floor.";
     case GapVerdict::explained:
       return names.empty()       ? "The gap is explained."
@@ -213,6 +226,7 @@ std::vector<std::string> gap_sentences(const Diagnosis& d, const std::string& ne
       out.push_back(std::move(sentence));
     }
   };
+  add(simulator_sentence(d));
   if (d.verdict == GapVerdict::no_gap) {
     add(shrink_sentence(d));
     return out;

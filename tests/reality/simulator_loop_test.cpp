@@ -196,5 +196,57 @@ INSTANTIATE_TEST_SUITE_P(All, Loop,
                                            LoopCase{"saturation", 5}),
                          [](const auto& tested) { return tested.param.effect; });
 
+// A robot of the engine without any effect, and its designer's file run by the engine at the same speeds.
+class FromASimulator : public ::testing::Test {
+ protected:
+  static Case healthy_case() {
+    Request request;
+    request.seed = 5;
+    request.effect = "payload";
+    request.laws = LawChoice("given");
+    request.duration = 60.0;
+    request.low = 8.0;
+    return make_case(request, 0);
+  }
+
+  static Diagnosis gap_from(const std::string& simulator, const LogTable& log, const Robot& robot) {
+    const Replay run = replay(simulator, log);
+    TableSource real(log), simulated(run.simulated);
+    gap::DiagnoseOptions options;
+    options.shrink = false;
+    options.baseline_simulated = true;
+    return gap::diagnose(real, &simulated, robot, options);
+  }
+
+  const Case made = healthy_case();
+  const Robot robot = robots::parse_robot(robot_yaml(made.robot, "case"), "robot.yaml");
+};
+
+TEST_F(FromASimulator, TheDesignersOwnIsNearlyTheHealthyRobot) {
+  const Diagnosis found = gap_from(designers_xml(made.robot), made.baseline, robot);
+  EXPECT_EQ(found.reference, gap::GapReference::simulator);
+  EXPECT_LT(found.gap, 0.01) << found.floor_origin;
+}
+
+// The robot is healthy and the file wrong: what is found is what the file lacks, though the robot file has it.
+TEST_F(FromASimulator, WhatTheFileLacksIsFound) {
+  SimulatorChange lighter;
+  lighter.mass = -1.5;
+  lighter.because["mass"] = "payload";
+  const robots::EditedSimulator wrong =
+      robots::edit_simulator(robots::SimulatorFormat::mjcf, designers_xml(made.robot), "robot.xml", lighter, robot);
+  ASSERT_FALSE(wrong.changed.empty());
+  const Diagnosis found = gap_from(wrong.text, made.baseline, robot);
+  ASSERT_FALSE(found.causes.empty());
+  EXPECT_EQ(found.causes.front().effect, "payload");
+  EXPECT_NEAR(found.causes.front().parameters.front().estimate, 1.5, 0.15);
+}
+
+TEST_F(FromASimulator, AnEffectOfTheRobotIsFound) {
+  const Diagnosis found = gap_from(designers_xml(made.robot), made.real, robot);
+  ASSERT_FALSE(found.causes.empty());
+  EXPECT_EQ(found.causes.front().effect, "payload");
+}
+
 }  // namespace
 }  // namespace wheelwright::reality::simulator_loop_test
