@@ -328,7 +328,7 @@ void threshold_figures(GapShrink& shrink, const Robot& robot, const PreparedGap&
   std::string why_not;
   const std::optional<Robot> nominal =
       improved_robot(robot, prepared.drive, prepared.drive.theta, robots_own(prepared.healthy), {}, why_not);
-  const bool with_floor = prepared.reference == GapReference::healthy_log && nominal.has_value();
+  const bool with_floor = prepared.baseline_log && prepared.reference != GapReference::simulator && nominal.has_value();
   std::vector<Commissioned> runs(with_floor ? 3 : 2);
   core::for_all(runs.size(), options.threads, [&](std::size_t k) {
     const LogTable& log = k == 2 ? *prepared.baseline_log : prepared.log;
