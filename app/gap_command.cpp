@@ -381,34 +381,25 @@ Run add_gap(CLI::App& program) {
   command.add_option("--robot", a->robot, "Robot file (YAML): the model whose gap it is")
       ->required()
       ->type_name("FILE");
-  command.add_option("--baseline", a->baseline, "Log of the same robot when it was healthy (may be repeated)")
-      ->type_name("LOG")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command
-      .add_option("--sim", a->simulated,
-                  "Log of your simulator under the same commands: the gap is from it (may be repeated)")
-      ->type_name("LOG")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->excludes("--baseline");
-  command
-      .add_option("--fresh", a->fresh, "Another log of the robot as it is now: whether what is promised holds there")
-      ->type_name("LOG")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  repeatable(
+      *command.add_option("--baseline", a->baseline, "Log of the same robot when it was healthy (may be repeated)")
+           ->type_name("LOG"));
+  repeatable(*command
+                  .add_option("--sim", a->simulated,
+                              "Log of your simulator under the same commands: the gap is from it (may be repeated)")
+                  ->type_name("LOG"))
+      .excludes("--baseline");
+  repeatable(*command
+                  .add_option("--fresh", a->fresh,
+                              "Another log of the robot as it is now: whether what is promised holds there")
+                  ->type_name("LOG"));
   command.add_option("--beta", a->beta, "Of the filter, 1/s (default: at most 10, lower where the motion is noisy)")
       ->transform(in_unit("1/s"))
       ->type_name("B")
       ->check(CLI::Range(0.1, 1000.0));
-  command.add_option("--without", a->without, "Do not look for this effect of the catalogue (may be repeated)")
-      ->type_name("EFFECT")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  repeatable(
+      *command.add_option("--without", a->without, "Do not look for this effect of the catalogue (may be repeated)")
+           ->type_name("EFFECT"));
   for (std::size_t k = 0; k < kSimulators.size(); ++k) {
     command.add_option(kSimulators[k].option, a->simulators[k], kSimulators[k].says)->type_name("FILE");
   }

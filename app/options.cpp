@@ -43,37 +43,33 @@ void take_columns(const std::filesystem::path& file, CommonOptions& options) {
 
 void add_footer(CLI::App& command, const char* text) { command.footer(text); }
 
+CLI::Option& repeatable(CLI::Option& option) {
+  return *option.expected(1)->allow_extra_args(false)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
 void add_map(CLI::App& command, CommonOptions& options) {
-  command
-      .add_option(
-          "--map", options.map,
-          "Read the log column NAME from the file's column COLUMN, or from a bag's TOPIC.FIELD (repeatable), e.g. "
-          "--map omega_r=wheel_2 or --map omega_r=/joint_states.velocity[right_wheel]")
-      ->type_name("NAME=COLUMN")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command
-      .add_option("--msg-path", options.msg_path,
-                  "Directory with definitions of messages (PKG/msg/TYPE.msg), for bags that do not bring their own "
-                  "(repeatable)")
-      ->type_name("DIR")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  repeatable(
+      *command
+           .add_option(
+               "--map", options.map,
+               "Read the log column NAME from the file's column COLUMN, or from a bag's TOPIC.FIELD (repeatable), e.g. "
+               "--map omega_r=wheel_2 or --map omega_r=/joint_states.velocity[right_wheel]")
+           ->type_name("NAME=COLUMN"));
+  repeatable(*command
+                  .add_option("--msg-path", options.msg_path,
+                              "Directory with definitions of messages (PKG/msg/TYPE.msg), for bags that do not bring "
+                              "their own (repeatable)")
+                  ->type_name("DIR"));
   command.add_flag("--trust", options.trust,
                    "Read also what a log reaches for outside of itself and its directory: links, HDF5's external and "
                    "virtual datasets, very large journals and packed files");
 }
 
 void add_despite(CLI::App& command, CommonOptions& options) {
-  command
-      .add_option("--despite", options.despite,
-                  "Go on despite this finding of `wheelwright doctor`, e.g. units.effort (repeatable)")
-      ->type_name("NAME")
-      ->expected(1)
-      ->allow_extra_args(false)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  repeatable(*command
+                  .add_option("--despite", options.despite,
+                              "Go on despite this finding of `wheelwright doctor`, e.g. units.effort (repeatable)")
+                  ->type_name("NAME"));
 }
 
 void add_persistence(CLI::App& command, std::optional<detector::Persistence>& persistence,

@@ -373,7 +373,7 @@ NoiseFloor together(const NoiseFloor& a, const NoiseFloor& b) {
 void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   Drive& drive = *prepared.healthy_drive;
   const double beta = prepared.row_options.beta;
-  const bool simulated = options.baseline_simulated;
+  const bool simulated = prepared.reference == GapReference::simulator;
   prepared.theta = fit_base(drive, beta);
   predict_efforts(drive, prepared.theta);
   NoiseFloor sensors = without_efforts(noise_floor(drive, signal_noise(drive), beta), drive);
@@ -409,14 +409,12 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
                              " already: what is reported is in addition to it");
   }
   if (simulated) {
-    prepared.reference = GapReference::simulator;
     prepared.floor = together(floor, prepared.floor);
     prepared.floor_origin += ", and what the model leaves of the simulator's log";
     return;
   }
   prepared.healthy.push_back(timing);
   prepared.floor = floor;
-  prepared.reference = GapReference::healthy_log;
   prepared.floor_origin = "what the model leaves of the healthy log";
 }
 
@@ -591,6 +589,7 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
     prepared.baseline_log = read_all(*baseline);
     to_torques(*prepared.baseline_log, prepared.view);
     prepared.healthy_drive = drive_of(*prepared.baseline_log, prepared.view);
+    prepared.reference = options.baseline_simulated ? GapReference::simulator : GapReference::healthy_log;
   }
   if (!prepared.drive.has_efforts) {
     prepared.notes.push_back(
@@ -599,14 +598,15 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
         "alone cannot be seen; log " +
         effort_columns(robot).front() + " and its like to see them");
     if (prepared.healthy_drive && prepared.healthy_drive->has_efforts) {
-      throw InputError("the healthy log has efforts and the other one has none: log them in both, or leave them out");
+      throw InputError(
+          fmt::format("the {} log has efforts and the other one has none: log them in both, or leave them out",
+                      prepared.reference == GapReference::simulator ? "simulator's" : "healthy"));
     }
   }
   // The filter is for the noise of the robot's sensors.
-  const bool healthy = prepared.healthy_drive && !options.baseline_simulated;
-  const Drive& reference = healthy ? *prepared.healthy_drive : prepared.drive;
+  const Drive& noisy = prepared.reference == GapReference::healthy_log ? *prepared.healthy_drive : prepared.drive;
   const double wish = options.beta ? *options.beta : kUsualBeta;
-  prepared.row_options.beta = options.beta ? *options.beta : choose_gap_beta(reference, signal_noise(reference), wish);
+  prepared.row_options.beta = options.beta ? *options.beta : choose_gap_beta(noisy, signal_noise(noisy), wish);
   if (prepared.healthy_drive) {
     learn_healthy(prepared, options);
     prepared.trusted.assign(model.p(), true);

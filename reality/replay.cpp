@@ -223,9 +223,8 @@ class Runner {
     }
     out.simulated.names = {"omega_r", "omega_l", "tau_r", "tau_l", "x", "y", "theta"};
     out.simulated.columns.resize(out.simulated.names.size());
-    set_state(0);
     for (std::size_t k = 0; k + 1 < t_.size(); ++k) {
-      if (starts_[k]) {
+      if (k == 0 || starts_[k]) {
         set_state(k);
         out.simulated.segment_starts.push_back(k);
       }
