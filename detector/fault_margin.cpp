@@ -17,6 +17,58 @@ constexpr double kNegligible = 1e-9;  // share of the largest size that is as go
 double largest_size(const Interval& side) { return std::max(std::abs(side.lower), std::abs(side.upper)); }
 double smallest_size(const Interval& side) { return std::max({0.0, side.lower, -side.upper}); }
 
+// Brackets the place where a function of κ, a quadratic on each of a few pieces, turns positive: f(below) <= 0 < f(above).
+class Crossing {
+ public:
+  Crossing(double at_zero, double above, double at_above) : below_{0.0, at_zero}, above_{above, at_above} {}
+
+  [[nodiscard]] double above() const { return above_.kappa; }
+  [[nodiscard]] double width() const { return above_.kappa - below_.kappa; }
+
+  // Where to look next: the root of the quadratic through both ends and the last point that was one, or of the chord;
+  // off the ends by half of what `precise` (relative) leaves open, so that a root that is known closes the bracket.
+  // Halves it where the last three steps did not.
+  [[nodiscard]] double propose(double precise) const {
+    if (slow_ >= 3) {
+      return below_.kappa + 0.5 * width();
+    }
+    const double root = below_.kappa + (last_ ? root_of_quadratic() : -below_.f / slope(below_, above_));
+    const double margin = 0.5 * std::min(precise * above_.kappa, width());
+    return std::isfinite(root) ? std::clamp(root, below_.kappa + margin, above_.kappa - margin)
+                               : below_.kappa + 0.5 * width();
+  }
+
+  void add(double kappa, double f) {
+    Point& end = f > 0.0 ? above_ : below_;
+    last_ = end;
+    end = {kappa, f};
+    ++slow_;
+    if (width() <= 0.5 * measured_) {
+      measured_ = width();
+      slow_ = 0;
+    }
+  }
+
+ private:
+  struct Point {
+    double kappa = 0.0, f = 0.0;
+  };
+  static double slope(const Point& a, const Point& b) { return (b.f - a.f) / (b.kappa - a.kappa); }
+
+  // From `below_` on, of f(below) + u b + u² c: it is negative or 0 at 0, positive at the width, so one root is between.
+  [[nodiscard]] double root_of_quadratic() const {
+    const double c = (slope(*last_, above_) - slope(below_, above_)) / (last_->kappa - below_.kappa);
+    const double b = slope(below_, above_) - width() * c;
+    const double root = std::sqrt(std::max(b * b - 4.0 * c * below_.f, 0.0));
+    return b > 0.0 ? -2.0 * below_.f / (b + root) : (root - b) / (2.0 * c);
+  }
+
+  Point below_, above_;
+  std::optional<Point> last_;
+  double measured_ = above_.kappa;
+  int slow_ = 0;  // steps since the bracket was last half as wide
+};
+
 }  // namespace
 
 // The regressor that acts, the one that is seen, and its error bound times `errors`. An error of y itself is in both,
@@ -76,21 +128,25 @@ bool FaultMargin::cannot_be_possible(const FaultRow& row, double kappa, double s
 double FaultMargin::certain_excess(const FaultRow& row, double kappa, double side, std::size_t channel,
                                    Direction direction) {
   const Sums sums = at(row, kappa, side, 2.0);
-  const Interval acting = rule_.prediction(acting_, 2 * channel);
-  const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
   const double added = side * kappa * row.c, doubt = sums.doubt + sums.rounding;
-  return direction == Direction::up ? acting.lower + added - row.dy - (allowed.upper + sums.predicted) - doubt
-                                    : allowed.lower + sums.predicted - (acting.upper + added + row.dy) - doubt;
+  if (direction == Direction::up) {
+    const double upper = rule_.upper(seen_, error_, row.dy, 2 * channel + 1);
+    return rule_.smallest(acting_, 2 * channel) + added - row.dy - (upper + sums.predicted) - doubt;
+  }
+  const double lower = rule_.lower(seen_, error_, row.dy, 2 * channel + 1);
+  return lower + sums.predicted - (rule_.largest(acting_, 2 * channel) + added + row.dy) - doubt;
 }
 
 double FaultMargin::possible_excess(const FaultRow& row, double kappa, double side, double share, std::size_t channel,
                                     Direction direction) {
   const Sums sums = at(row, kappa, side, 1.0 - share);
-  const Interval acting = rule_.prediction(acting_, 2 * channel);
-  const Threshold allowed = rule_.at(seen_, error_, row.dy, 2 * channel + 1);
   const double added = side * kappa * row.c, doubt = sums.doubt + sums.rounding;
-  return direction == Direction::up ? acting.upper + added + share * row.dy - (allowed.upper + sums.predicted) + doubt
-                                    : allowed.lower + sums.predicted - (acting.lower + added - share * row.dy) + doubt;
+  if (direction == Direction::up) {
+    const double upper = rule_.upper(seen_, error_, row.dy, 2 * channel + 1);
+    return rule_.largest(acting_, 2 * channel) + added + share * row.dy - (upper + sums.predicted) + doubt;
+  }
+  const double lower = rule_.lower(seen_, error_, row.dy, 2 * channel + 1);
+  return lower + sums.predicted - (rule_.smallest(acting_, 2 * channel) + added - share * row.dy) + doubt;
 }
 
 bool FaultMargin::certain(const FaultRow& row, double kappa, double side, std::size_t channel) {
@@ -121,31 +177,17 @@ std::optional<double> FaultMargin::smallest_certain(const FaultRow& row, double 
     if (cannot_be_certain(row, above, side, direction)) {
       continue;
     }
-    double excess_above = certain_excess(row, above, side, channel, direction);
+    const auto excess = [&](double kappa) { return certain_excess(row, kappa, side, channel, direction); };
+    const double excess_above = excess(above);
     if (!(excess_above > 0.0)) {
       continue;
     }
-    double below = 0.0;
-    double excess_below = std::min(certain_excess(row, 0.0, side, channel, direction), 0.0);
-    // Regula falsi that halves the weight of an end that stands still (Illinois), with bisection now and then.
-    for (int step = 0, stood = 0; above - below > kPrecise * above && step < 200; ++step) {
-      double middle = above - excess_above * (above - below) / (excess_above - excess_below);
-      if (step % 4 == 3 || !(middle > below && middle < above)) {
-        middle = 0.5 * (below + above);
-      }
-      const double excess = certain_excess(row, middle, side, channel, direction);
-      if (excess > 0.0) {
-        above = middle;
-        excess_above = excess;
-        excess_below *= stood == 1 ? 0.5 : 1.0;
-        stood = 1;
-      } else {
-        below = middle;
-        excess_below = excess;
-        excess_above *= stood == -1 ? 0.5 : 1.0;
-        stood = -1;
-      }
+    Crossing crossing(std::min(excess(0.0), 0.0), above, excess_above);
+    for (int step = 0; crossing.width() > kPrecise * crossing.above() && step < 200; ++step) {
+      const double kappa = crossing.propose(kPrecise);
+      crossing.add(kappa, excess(kappa));
     }
+    above = crossing.above();
     best = above;
   }
   return best;
@@ -173,18 +215,27 @@ double FaultMargin::largest_hidden(const FaultRow& row, double largest, double s
     // From the left, pieces on which no size can be seen are passed over; a quadratic rises above its chord by no more
     // than a fourth of its second coefficient times the squared width.
     double from = 0.0, at_from = excess(0.0), width = hidden;
-    while (from < hidden && at_from <= 0.0) {
-      width = std::min(width, hidden - from);
-      const double to = from + width, at_to = excess(to);
+    // The longest piece that may be passed over if the excess rises so much per unit of κ.
+    const auto reach = [&](double rise) {
+      const double linear = std::max(rise, 0.0) + 0.5 * slope;
+      const double sum = linear + std::sqrt(linear * linear - curvature * at_from);
+      return sum > 0.0 ? -2.0 * at_from / sum : hidden;
+    };
+    for (bool failed = false; from < hidden && at_from <= 0.0;) {
+      const double precise = std::max(kHidden * from, kNegligible * largest);
+      width = std::min(std::max(width, precise), hidden - from);
+      const double to = from + width, at_to = excess(to), rise = (at_to - at_from) / width;
       const double most = std::max(at_from, at_to) + 0.25 * width * width * curvature + 0.5 * width * slope;
       if (most <= 0.0) {
         from = to;
         at_from = at_to;
-        width *= 2.0;
-      } else if (width <= std::max(kHidden * from, kNegligible * largest)) {
+        width = reach(rise);
+        failed = false;
+      } else if (width <= precise) {
         break;
       } else {
-        width *= 0.5;
+        width = std::min((1.0 - 0.25 * kHidden) * reach(rise), (failed ? 0.5 : 0.9) * width);
+        failed = true;
       }
     }
     hidden = std::min(hidden, from);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
@@ -140,57 +141,97 @@ class ChannelBest {
   double best_ = kInfinity;
 };
 
-OnsetMargin margin_at(const ReferenceMotion& motion, const FaultMargins& margins, std::size_t onset, FaultRows& rows,
-                      FaultMargin& margin, const MarginOptions& options) {
-  const FaultType& fault = margins.fault;
-  const std::size_t n = rows.outputs();
-  const double largest = std::abs(fault.kappa(margins.side * margins.largest()));
-  OnsetMargin result;
-  result.instant = onset;
-  result.t = motion.instant[onset];
-  result.by_channel.resize(n);
-  std::vector<ChannelBest> channels(n, ChannelBest(options.persistence, largest, fault.whole));
-  double hidden = largest, window_hidden = largest;
-  std::size_t window = 0;
-  const auto size_of = [&](double kappa) {
-    return kappa < kInfinity ? std::abs(fault.magnitude(margins.side * kappa)) : kInfinity;
-  };
-  const auto close_windows = [&](double since) {
-    for (; window < options.windows.size() && since > options.windows[window]; ++window) {
+// One side of a fault from one onset on.
+class SideWatch {
+ public:
+  SideWatch(const FaultMargins& margins, std::size_t outputs, const MarginOptions& options)
+      : margins_(margins),
+        options_(options),
+        largest_(std::abs(margins.fault.kappa(margins.side * margins.largest()))),
+        channels_(outputs, ChannelBest(options.persistence, largest_, margins.fault.whole)),
+        hidden_(largest_),
+        window_hidden_(largest_) {
+    result_.by_channel.resize(outputs);
+  }
+
+  // Windows that end before `since` s after the onset; whether others are open.
+  bool close_windows(double since) {
+    while (open() && since > options_.windows[result_.certain.size()]) {
       double best = kInfinity;
-      for (std::size_t i = 0; i < n; ++i) {
-        result.by_channel[i].push_back(size_of(channels[i].best()));
-        best = std::min(best, result.by_channel[i].back());
+      for (std::size_t i = 0; i < channels_.size(); ++i) {
+        result_.by_channel[i].push_back(size_of(channels_[i].best()));
+        best = std::min(best, result_.by_channel[i].back());
       }
-      result.certain.push_back(best);
-      window_hidden = hidden;
+      result_.certain.push_back(best);
+      window_hidden_ = hidden_;
     }
-  };
+    return open();
+  }
+
+  void add(FaultMargin& margin, const FaultRow& row, std::size_t channel) {
+    channels_[channel].add(margin, row, margins_.side, channel);
+    if (!margins_.fault.whole) {
+      hidden_ = margin.largest_hidden(row, hidden_, margins_.side, options_.noise_share, channel);
+    } else if (hidden_ > 0.0 && margin.possible(row, largest_, margins_.side, options_.noise_share, channel)) {
+      hidden_ = 0.0;
+    }
+  }
+
+  // Of rows that are not known exactly nothing is certain and nothing is hidden.
+  void add_inexact() { hidden_ = 0.0; }
+
+  [[nodiscard]] OnsetMargin result() {
+    result_.hidden = size_of(window_hidden_);
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] bool open() const { return result_.certain.size() < options_.windows.size(); }
+  [[nodiscard]] double size_of(double kappa) const {
+    return kappa < kInfinity ? std::abs(margins_.fault.magnitude(margins_.side * kappa)) : kInfinity;
+  }
+
+  const FaultMargins& margins_;
+  const MarginOptions& options_;
+  double largest_;
+  std::vector<ChannelBest> channels_;
+  double hidden_, window_hidden_;
+  OnsetMargin result_;
+};
+
+// Of the sides of one fault, all of which have the same rows; `solvers` has one for each.
+void margins_from(const ReferenceMotion& motion, std::span<FaultMargins> sides, std::size_t onset, std::size_t instant,
+                  FaultRows& rows, std::vector<FaultMargin>& solvers, const MarginOptions& options) {
+  const std::size_t n = rows.outputs();
+  std::vector<SideWatch> watches;
+  for (const FaultMargins& side : sides) {
+    watches.emplace_back(side, n, options);
+  }
+  const double start = motion.instant[instant];
   const bool exact = rows.exact();
-  rows.begin(onset);
-  while (window < options.windows.size() && rows.next()) {
-    const std::size_t k = rows.instant();
-    const double since = motion.t[k] - result.t;
-    close_windows(since);
-    if (window == options.windows.size()) {
-      break;
+  rows.begin(instant);
+  for (bool open = true; open && rows.next();) {
+    const double since = motion.t[rows.instant()] - start;
+    for (SideWatch& watch : watches) {
+      open = watch.close_windows(since);
     }
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = 0; open && i < n; ++i) {
       const FaultRow row = rows.row(i);
-      if (!exact) {
-        hidden = 0.0;
-        continue;
-      }
-      channels[i].add(margin, row, margins.side, i);
-      if (!fault.whole) {
-        hidden = margin.largest_hidden(row, hidden, margins.side, options.noise_share, i);
-      } else if (hidden > 0.0 && margin.possible(row, largest, margins.side, options.noise_share, i)) {
-        hidden = 0.0;
+      for (std::size_t s = 0; s < sides.size(); ++s) {
+        if (exact) {
+          watches[s].add(solvers[s], row, i);
+        } else {
+          watches[s].add_inexact();
+        }
       }
     }
   }
-  result.hidden = size_of(window_hidden);
-  return result;
+  for (std::size_t s = 0; s < sides.size(); ++s) {
+    OnsetMargin& result = sides[s].onsets[onset];
+    result = watches[s].result();
+    result.instant = instant;
+    result.t = start;
+  }
 }
 
 }  // namespace
@@ -230,27 +271,36 @@ std::vector<FaultMargins> margins_along(const ReferenceMotion& motion, const std
   check::that(!onsets.empty(), "drive", "a stretch in which the filter has settled and that is longer than a window");
   const std::vector<ManoeuvreKind> kinds = kinds_of(motion, onsets, options);
   std::vector<FaultMargins> all;
+  std::vector<std::size_t> first;  // of each fault, and the end
   for (const FaultType& fault : faults) {
+    first.push_back(all.size());
     for (const double side : {1.0, -1.0}) {
       if ((side > 0.0 ? fault.range.upper : -fault.range.lower) > 0.0) {
         all.push_back({fault, side, std::vector<OnsetMargin>(onsets.size())});
       }
     }
   }
+  first.push_back(all.size());
   core::for_all(
-      all.size(), options.threads,
-      [&](std::size_t i) {
-        FaultMargins& each = all[i];
-        const std::unique_ptr<FaultRows> source = rows(each.fault);
-        FaultMargin margin(rule);
+      faults.size(), options.threads,
+      [&](std::size_t f) {
+        const std::span<FaultMargins> sides(all.begin() + static_cast<std::ptrdiff_t>(first[f]),
+                                            first[f + 1] - first[f]);
+        if (sides.empty()) {
+          return;
+        }
+        const std::unique_ptr<FaultRows> source = rows(faults[f]);
+        std::vector<FaultMargin> solvers(sides.size(), FaultMargin(rule));
         for (std::size_t k = 0; k < onsets.size(); ++k) {
-          each.onsets[k] = margin_at(motion, each, onsets[k], *source, margin, options);
-          each.onsets[k].kind = kinds[k];
+          margins_from(motion, sides, k, onsets[k], *source, solvers, options);
+          for (FaultMargins& side : sides) {
+            side.onsets[k].kind = kinds[k];
+          }
         }
       },
       [&](std::size_t begun) {
         if (options.progress) {
-          options.progress("margins of faults", static_cast<double>(begun) / static_cast<double>(all.size()));
+          options.progress("margins of faults", static_cast<double>(begun) / static_cast<double>(faults.size()));
         }
       });
   return all;

@@ -73,8 +73,12 @@ std::vector<FaultMargins> margins_at_risk(const SumDrive& drive, const OnlineMod
           }
           std::optional<SumRow> row;
           for (std::size_t s = 0; s < count; ++s) {
-            const double size = about(all[first + s].side * at.once, at.twice, look.width + 2.0 * look.radius);
+            const double gap = look.width + 2.0 * look.radius;
             Candidate& own = best[(at.onset * count + s) * windows + window];
+            if (own.size < kInfinity && (std::abs(at.once) + std::abs(at.twice) * own.size) * own.size < gap) {
+              continue;  // about() would be larger
+            }
+            const double size = about(all[first + s].side * at.once, at.twice, gap);
             if (size < own.size) {
               row = row ? row : std::optional(at.row());
               own = {size, look.weight, *row};

@@ -35,8 +35,8 @@ ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSe
   }
 }
 
-Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
-                            std::size_t channel) const noexcept {
+ThresholdRule::Beside ThresholdRule::beside(std::span<const double> y, std::span<const double> dy_regressor,
+                                            double dy_output) const noexcept {
   const std::size_t p = direction_.size();
   double extra = dy_output;
   double predicted = 0.0;
@@ -58,20 +58,46 @@ Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> d
     up[j] = y[j] + shift;
     down[j] = -y[j] + shift;
   }
-  const double above = support({up, p}, 2 * channel);
-  const double below = support({down, p}, 2 * channel + 1);
   // Sums of p + 3 terms, and as many in the residual that is compared with the result: Higham 2002, section 3.1. The
   // rounding of the direction itself is covered by the terms Δ|θ|. |h(±y + Δ)| <= Σ (|y_j| + Δ_j) max|θ_j|: measured
   // with the box, so that the same margin is added whichever set is used.
   magnitude += extra + 2.0 * reach;
   const double rounding = 4.0 * static_cast<double>(p + 4) * std::numeric_limits<double>::epsilon() * magnitude;
-  return {-below - predicted - extra - rounding, above - predicted + extra + rounding};
+  return {predicted, extra, rounding};
+}
+
+Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
+                            std::size_t channel) const noexcept {
+  const Beside by = beside(y, dy_regressor, dy_output);
+  const double above = support(direction_, 2 * channel);
+  const double below = support(opposite_, 2 * channel + 1);
+  return {-below - by.predicted - by.extra - by.rounding, above - by.predicted + by.extra + by.rounding};
+}
+
+double ThresholdRule::upper(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
+                            std::size_t channel) const noexcept {
+  const Beside by = beside(y, dy_regressor, dy_output);
+  return support(direction_, 2 * channel) - by.predicted + by.extra + by.rounding;
+}
+
+double ThresholdRule::lower(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
+                            std::size_t channel) const noexcept {
+  const Beside by = beside(y, dy_regressor, dy_output);
+  return -support(opposite_, 2 * channel + 1) - by.predicted - by.extra - by.rounding;
 }
 
 Interval ThresholdRule::prediction(std::span<const double> y, std::size_t channel) const noexcept {
-  std::transform(y.begin(), y.end(), direction_.begin(), [](double v) { return -v; });
-  const double below = support(direction_, 2 * channel + 1);
-  return {-below, support(y, 2 * channel)};
+  const double below = smallest(y, channel);
+  return {below, largest(y, channel)};
+}
+
+double ThresholdRule::largest(std::span<const double> y, std::size_t channel) const noexcept {
+  return support(y, 2 * channel);
+}
+
+double ThresholdRule::smallest(std::span<const double> y, std::size_t channel) const noexcept {
+  std::transform(y.begin(), y.end(), opposite_.begin(), [](double v) { return -v; });
+  return -support(opposite_, 2 * channel + 1);
 }
 
 }  // namespace wheelwright::detector

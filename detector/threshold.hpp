@@ -51,8 +51,17 @@ class ThresholdRule {
   [[nodiscard]] Threshold at(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
                              std::size_t channel = 0) const noexcept;
 
+  /// at().upper alone, and at().lower alone, for half the work.
+  [[nodiscard]] double upper(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
+                             std::size_t channel = 0) const noexcept;
+  [[nodiscard]] double lower(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
+                             std::size_t channel = 0) const noexcept;
+
   /// min and max of yθ over the set, outward: the noise-free prediction interval.
   [[nodiscard]] Interval prediction(std::span<const double> y, std::size_t channel = 0) const noexcept;
+  /// prediction().upper alone, and prediction().lower alone.
+  [[nodiscard]] double largest(std::span<const double> y, std::size_t channel = 0) const noexcept;
+  [[nodiscard]] double smallest(std::span<const double> y, std::size_t channel = 0) const noexcept;
 
   [[nodiscard]] const Polytope& set() const noexcept { return set_; }
   [[nodiscard]] const Eigen::VectorXd& estimate() const noexcept { return estimate_; }
@@ -69,6 +78,14 @@ class ThresholdRule {
            : walk_ ? walk_->support(a, slot % kSlots)
                    : set_.hull().support(a);
   }
+
+  // What stands beside h in both thresholds.
+  struct Beside {
+    double predicted, extra, rounding;
+  };
+  // Fills direction_ for h(y + Δ) and opposite_ for h(−y + Δ).
+  [[nodiscard]] Beside beside(std::span<const double> y, std::span<const double> dy_regressor,
+                              double dy_output) const noexcept;
 
   Polytope set_;
   Eigen::VectorXd estimate_;
