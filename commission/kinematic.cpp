@@ -441,7 +441,7 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
     return result;
   }
   filter::OdometryMeasurement independent = *measurement;
-  const PoseOrigin origin = pose_origin(log, independent, options.window, robot.encoder_counts_per_turn.value_or(0.0));
+  const PoseOrigin origin = pose_origin(log, independent, options.window, robot);
   independent.heading = independent.heading && !origin.heading_repeats;
   independent.position = independent.position && !origin.position_repeats;
   if (!independent.heading && !independent.gyro) {

@@ -31,6 +31,7 @@ constexpr double kStraight = 1e-9;         // rad: second differences below are 
 constexpr double kOfInterpolation = 1.25;  // second differences of samples are not the largest second derivative
 constexpr double kLongestPoseStep = 0.25;  // s
 constexpr double kBendSpan = 0.05;         // s
+constexpr double kClose = 1e-5;            // rad: no sensor of its own would be as close to wheels on a floor
 constexpr double kWholeTurn = 2.0 * std::numbers::pi;
 
 // The coarsest decimal unit of which all values are multiples, as they are or wrapped into a turn; 0 where there is
@@ -125,9 +126,12 @@ struct Kept {
   std::array<std::vector<double>, 2> wheel;
 
   [[nodiscard]] std::size_t rows() const { return t.size(); }
-  // |second difference| of a signal about row k, by rows `span` away: counts of an encoder weigh less by its square.
+  // Second difference of a signal about row k, by rows `span` away: counts of an encoder weigh less by its square.
+  static double signed_bend(const std::vector<double>& of, std::size_t k, std::size_t span) {
+    return (of[k + span] - 2.0 * of[k] + of[k - span]) / static_cast<double>(span * span);
+  }
   static double bend(const std::vector<double>& of, std::size_t k, std::size_t span = 1) {
-    return std::abs(of[k + span] - 2.0 * of[k] + of[k - span]) / static_cast<double>(span * span);
+    return std::abs(signed_bend(of, k, span));
   }
 };
 
@@ -164,11 +168,32 @@ std::optional<double> between_rests(const std::vector<Kept>& segments) {
   return drives.rest(kFewestDrives);
 }
 
+// Whether second differences of the heading are more than what the wheels' counts and its own `quantum` would make of
+// it: it has noise of its own, which nothing that is computed of these counts has.
+bool rougher_than_counts(const std::vector<Kept>& segments, const Eigen::Vector2d& weights, double quantum) {
+  double heading = 0.0, wheels = 0.0;
+  for (const Kept& log : segments) {
+    for (std::size_t k = 1; k + 1 < log.rows(); ++k) {
+      heading += std::pow(Kept::signed_bend(log.heading, k, 1), 2);
+      wheels += 0.5 * quantum * quantum + std::pow(weights[0] * Kept::signed_bend(log.wheel[0], k, 1) +
+                                                       weights[1] * Kept::signed_bend(log.wheel[1], k, 1),
+                                                   2);
+    }
+  }
+  return heading > kOfTheRounding * wheels;
+}
+
+// Of a heading that is within what lines between samples, and counts of the wheels, leave of wheel odometry.
+struct WithinLines {
+  double rest = 0.0;     // rad, rms
+  bool decided = false;  // closer than any sensor of its own would be
+};
+
 // What the wheels leave of a heading that is linear between stamps of its own, where that is no more than the
-// interpolation h²/8·|d²/dt²| at both ends of each window and a count of each wheel there; nothing where it is more. h
-// is that of the kinks: a sample bends the line at two rows at most.
-std::optional<double> within_interpolation(const std::vector<Kept>& segments, double window, double step,
-                                           double count) {
+// interpolation h²/8·|d²/dt²| at both ends of each window and a count of each wheel there, and the heading no rougher than
+// counts make it; nothing otherwise. h is that of the kinks: a sample bends the line at two rows at most.
+std::optional<WithinLines> within_interpolation(const std::vector<Kept>& segments, double window, double step,
+                                                double count, double quantum) {
   Combination windows(count / std::sqrt(6.0));
   std::size_t bent = 0, moving = 0;
   std::vector<std::pair<const Kept*, std::array<std::size_t, 2>>> places;
@@ -199,6 +224,7 @@ std::optional<double> within_interpolation(const std::vector<Kept>& segments, do
   const double by_counts = 2.0 * count * c.cwiseAbs().sum();
   const std::vector<double> left = windows.rests();
   double squares = 0.0, expected = 0.0;
+  std::size_t close = 0;
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto& [log, ends] = places[i];
     double by_lines = kExactHeading;
@@ -214,11 +240,15 @@ std::optional<double> within_interpolation(const std::vector<Kept>& segments, do
     if (std::abs(left[i]) > by_lines + by_counts) {
       return std::nullopt;
     }
+    close += by_lines + by_counts <= kClose ? 1U : 0U;
     squares += left[i] * left[i];
     // Rounding: 1/12 of a count² at the row, two thirds of that between two samples, at both ends.
     expected += 0.5 * by_lines * by_lines + 5.0 / 18.0 * count * count * c.squaredNorm();
   }
-  return squares <= kOfTheRounding * expected ? windows.rest() : std::nullopt;
+  if (squares > kOfTheRounding * expected || (by_counts > 0.0 && rougher_than_counts(segments, c, quantum))) {
+    return std::nullopt;
+  }
+  return WithinLines{windows.rest().value_or(0.0), close >= kFewestDrives};
 }
 
 // The count of the encoder that steps of an angle are made of, rad; 0 where they are not.
@@ -232,7 +262,7 @@ using Turned = std::array<std::array<double, 2>, 3>;
 
 }  // namespace
 
-PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, double window, double counts_per_turn) {
+PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, double window, const model::Robot& robot) {
   PoseOrigin origin;
   if (!m.heading) {
     return origin;
@@ -320,9 +350,9 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
   };
   if (const auto rest = m.held_pose ? std::nullopt : least(headings)) {
     origin.heading_rest = *rest;
-    const double count = m.count > 0.0           ? m.count * m.nominal_step
-                         : counts_per_turn > 0.0 ? kWholeTurn / counts_per_turn
-                                                 : 0.0;
+    const double count = m.count > 0.0                   ? m.count * m.nominal_step
+                         : robot.encoder_counts_per_turn ? kWholeTurn / *robot.encoder_counts_per_turn
+                                                         : 0.0;
     // Half a count at both ends of a window and both wheels, times a gain that is about a third: an independent
     // heading.
     const double by_counts = count / (3.0 * std::sqrt(3.0));
@@ -335,9 +365,11 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
     if (const auto rest = between_rests(kept); rest && *rest < kExactHeading) {
       origin.heading_rest = *rest;
       by_stamps = "from one rest to the next";
-    } else if (const auto linear = within_interpolation(kept, window, m.nominal_step, rounding_of(wheel_steps));
-               linear && !m.held_pose) {
-      origin.heading_rest = *linear;
+    } else if (const auto linear =
+                   within_interpolation(kept, window, m.nominal_step, rounding_of(wheel_steps), decimals.quantum());
+               linear && !m.held_pose && !(!linear->decided && robot.pose_source == model::PoseSource::independent)) {
+      origin.heading_rest = linear->rest;
+      origin.undecided = !linear->decided;
       by_stamps = fmt::format("over {:.3g} s, no more than lines between the samples of a pose that repeats the wheels",
                               window);
     }
@@ -348,7 +380,15 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
     origin.position_repeats = *rest < kExactWay;
   }
   origin.position_repeats = origin.position_repeats || (m.position && origin.heading_repeats);
-  if (!by_stamps.empty()) {
+  if (origin.undecided) {
+    origin.sentence = fmt::format(
+        "{} cannot be told from wheel odometry, and is not taken for a measurement of its own: a combination of the "
+        "wheel "
+        "angles leaves {:.2g} rad of the heading over {:.3g} s, no more than lines between the samples of a pose that "
+        "repeats the wheels; if it is measured (camera, lidar, motion capture), write pose_source: independent in the "
+        "robot file",
+        m.position ? "the pose" : "the heading", origin.heading_rest, window);
+  } else if (!by_stamps.empty()) {
     origin.sentence = fmt::format(
         "{} wheel odometry over again, not measured independently: a combination of the wheel angles leaves {:.2g} rad "
         "of the heading {}",

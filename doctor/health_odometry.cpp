@@ -375,16 +375,16 @@ void check_pose_origin(const HealthView& view, std::vector<LogFinding>& out) {
     m.motion_columns.push_back(angles ? j.angle_name : j.speed_name);
   }
   TableSource log(*view.log);
-  const commission::PoseOrigin origin =
-      commission::pose_origin(log, m, kWindow, view.robot.encoder_counts_per_turn.value_or(0.0));
+  const commission::PoseOrigin origin = commission::pose_origin(log, m, kWindow, view.robot);
   if (origin.sentence.empty()) {
     return;
   }
   std::string sentence = origin.sentence + ".";
   sentence[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(sentence[0])));
   out.push_back(about_units("signals.pose_repeats_wheels", FindingSeverity::warning, std::move(sentence),
-                            "It is not used: log a pose that does not come from the wheels (camera, lidar, motion "
-                            "capture), or a gyro.",
+                            origin.undecided ? "It is not used."
+                                             : "It is not used: log a pose that does not come from the wheels "
+                                               "(camera, lidar, motion capture), or a gyro.",
                             origin.heading_repeats && m.position ? std::vector<std::string>{"x", "y", "theta"}
                             : origin.heading_repeats             ? std::vector<std::string>{"theta"}
                                                                  : std::vector<std::string>{"x", "y"},

@@ -43,6 +43,12 @@ enum class SpeedSource {
   measured,            ///< samples of the speed itself
 };
 
+/// What a logged pose is.
+enum class PoseSource {
+  automatic,    ///< a measurement of its own, unless it agrees with the wheels as only wheel odometry does
+  independent,  ///< a measurement of its own, also where an encoder's counts are too coarse to show it
+};
+
 /// A bound |n| <= value on the noise of a sensor, or the wish that it be estimated from the log.
 struct NoiseBound {
   std::optional<double> value;  ///< unit of the column; nothing means "estimate"
@@ -111,6 +117,7 @@ struct Robot {
   FilterWish filter;
   std::optional<double> encoder_counts_per_turn;
   SpeedSource speed_source = SpeedSource::automatic;
+  PoseSource pose_source = PoseSource::automatic;
   std::map<std::string, double> limits;    ///< effort, speed, acceleration
   std::optional<double> kinematic_window;  ///< s, of the kinematic residual (odometry_filter.hpp)
   std::optional<Motor> motor;

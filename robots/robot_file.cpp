@@ -51,10 +51,17 @@ struct RobotReader {
   static bool drive(const Robot& robot) { return robot.model == "differential_drive"; }
 
   void read() {
-    const auto members = root.members(
-        {"name",         "model",  "wheel_radius", "track_width", "footprint", "lever_arm", "friction",
-         "parameters",   "effort", "nominal",      "prior",       "noise",     "filter",    "encoder_counts_per_turn",
-         "speed_source", "limits", "kinematic",    "motor",       "effects",   "columns"});
+    const auto members = root.members({"name",         "model",
+                                       "wheel_radius", "track_width",
+                                       "footprint",    "lever_arm",
+                                       "friction",     "parameters",
+                                       "effort",       "nominal",
+                                       "prior",        "noise",
+                                       "filter",       "encoder_counts_per_turn",
+                                       "speed_source", "pose_source",
+                                       "limits",       "kinematic",
+                                       "motor",        "effects",
+                                       "columns"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }
@@ -198,6 +205,8 @@ struct RobotReader {
       robot.encoder_counts_per_turn = place.positive();
     } else if (key == "speed_source") {
       robot.speed_source = static_cast<model::SpeedSource>(place.choice({"auto", "encoder_difference", "measured"}));
+    } else if (key == "pose_source") {
+      robot.pose_source = static_cast<model::PoseSource>(place.choice({"auto", "independent"}));
     }
   }
 
@@ -446,6 +455,9 @@ Json to_json(const Robot& robot) {
     out["encoder_counts_per_turn"] = *robot.encoder_counts_per_turn;
   }
   out["speed_source"] = sources[static_cast<std::size_t>(robot.speed_source)];
+  if (robot.pose_source == model::PoseSource::independent) {
+    out["pose_source"] = "independent";
+  }
   for (const auto& [name, value] : robot.limits) {
     out["limits"][name] = value;
   }

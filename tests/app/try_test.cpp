@@ -112,10 +112,10 @@ TEST_F(Try, TurtleBotByItsOdometryWhichIsNoPose) {
   const Robot robot = robots::read_robot(path("wheelwright_try/robot.yaml"));
   EXPECT_NEAR(robot.wheel_radius, burger.r, 1e-3 * burger.r);
   EXPECT_NEAR(robot.track_width, burger.D, 1e-3 * burger.D);
-  EXPECT_THAT(told.out, HasSubstr("wheel odometry over again"));
+  EXPECT_THAT(told.out, HasSubstr("cannot be told from wheel odometry"));
   EXPECT_FALSE(model().contains("kinematic"));
   EXPECT_THAT(run("identify burger.mcap --robot wheelwright_try/robot.yaml").out,
-              AllOf(HasSubstr("wheel odometry over again"), Not(HasSubstr("radius_right"))));
+              AllOf(HasSubstr("cannot be told from wheel odometry"), Not(HasSubstr("radius_right"))));
 }
 
 // What was settled needs no option twice: a map stays in the robot file, and in model.json for detect.

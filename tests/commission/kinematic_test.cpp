@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <wheelwright/commission/commission.hpp>
@@ -16,6 +17,8 @@
 namespace wheelwright::commission::kinematic_test {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 using testing_support::posed_drive;
 using testing_support::straight_drive;
 using testing_support::true_kinematics;
@@ -107,6 +110,34 @@ TEST(Kinematic, IsAbsentWithoutAPose) {
   EXPECT_FALSE(result.model.kinematic.has_value());
   EXPECT_NE(result.kinematic.message.find("gyro_z"), std::string::npos);
   EXPECT_NE(std::ranges::find(result.notes, result.kinematic.message), result.notes.end());
+}
+
+// A heading that is measured by itself, beside encoders of all kinds: it is never said to be the wheels'; where nothing
+// shows that it is not, this is said, with the way out.
+TEST(Kinematic, AHeadingOfItsOwnIsNeverSaidToBeTheWheels) {
+  std::uint64_t seed = 30;
+  int hidden = 0;
+  for (const double rate : {50.0, 200.0}) {
+    for (const double counts : {256.0, 2048.0, 8192.0}) {
+      for (const double heading : {0.0002, 0.0007, 0.003}) {
+        Scenario s = posed_drive(++seed);
+        s.rate = rate;
+        s.robot.encoder_counts_per_turn = s.sensors.encoder_counts_per_turn = counts;
+        s.robot.noise.heading.value = s.sensors.heading = heading;
+        Simulation log(s);
+        const KinematicCommissioning result = commission_robot(log, s.robot).kinematic;
+        if (result.status != Status::done) {
+          EXPECT_THAT(result.message, AllOf(HasSubstr("cannot be told"), HasSubstr("pose_source: independent")));
+          s.robot.pose_source = model::PoseSource::independent;
+          Simulation again(s);
+          EXPECT_EQ(commission_robot(again, s.robot).kinematic.status, Status::done);
+          ++hidden;
+        }
+      }
+    }
+  }
+  EXPECT_GT(hidden, 0);
+  EXPECT_LT(hidden, 12);
 }
 
 // Odometry as a base driver publishes it, from the same encoder: margins on it would be those of a perfect sensor.

@@ -28,6 +28,7 @@ noise:   {wheel_speed: 0.02, effort: estimate, position: 0.002, wheel_angle: 1.0
 filter:  {order: 2, alpha: 20, beta: 25}
 encoder_counts_per_turn: 4096
 speed_source: encoder_difference
+pose_source: independent
 limits:  {effort: 6.0, speed: 2}
 motor: {torque_constant: 0.0105, resistance: 3.3, back_emf: 0.0105, gear_ratio: 9.69}
 parameters: [mass, yaw_inertia]
@@ -59,6 +60,7 @@ TEST(RobotFile, ReadsEveryKey) {
   EXPECT_EQ(robot.filter.beta, 25.0);
   EXPECT_EQ(robot.encoder_counts_per_turn, 4096.0);
   EXPECT_EQ(robot.speed_source, model::SpeedSource::encoder_difference);
+  EXPECT_EQ(robot.pose_source, model::PoseSource::independent);
   EXPECT_EQ(robot.limits.at("effort"), 6.0);
   EXPECT_EQ(robot.limits.at("speed"), 2.0);
   EXPECT_EQ(robot.motor.value().gear_ratio, 9.69);
@@ -195,6 +197,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"filter: {order: 1.5}", "filter.order: '1.5': expected 1, 2 or auto"},
         Bad{"filter: {alpha: 0}", "filter.alpha: '0': expected a rate > 0 in 1/s, or auto"},
         Bad{"encoder_counts_per_turn: 0", "encoder_counts_per_turn: '0': expected a number > 0"},
+        Bad{"pose_source: wheels", "pose_source: 'wheels': expected one of auto, independent"},
         Bad{"speed_source: encoder", "speed_source: 'encoder': expected one of auto, encoder_difference, measured"},
         Bad{"limits: {torque: 3}", "limits: unknown key 'torque': expected one of effort, speed, acceleration"},
         Bad{"footprint: {radius: 0}", "footprint.radius: '0': expected metres, > 0 and at most 100"},

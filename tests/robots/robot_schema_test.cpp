@@ -41,6 +41,7 @@ TEST(RobotSchema, CoversWhatIsWritten) {
   robot.prior["mass"] = {1.0, 5.0};
   robot.filter.order = 2;
   robot.encoder_counts_per_turn = 4096.0;
+  robot.pose_source = model::PoseSource::independent;
   robot.limits["effort"] = 1.0;
   robot.motor.emplace();
   robot.kinematic_window = 0.5;
