@@ -347,17 +347,37 @@ void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, 
                          "same, and `gap` tells it"});
 }
 
-// θ with the rows of `model` shifted by `shift`.
-Eigen::VectorXd at_shift(const identify::TimeShiftedRows& model, double shift, const Eigen::VectorXd& weights) {
+// The rows of `model` shifted by `shift`, weighted: θ, its residual, and what a further shift adds beyond θ.
+struct Shifted {
+  Eigen::VectorXd theta, residual, more;
+};
+
+Shifted at_shift(const identify::TimeShiftedRows& model, double shift, const Eigen::VectorXd& weights) {
   identify::SeparableValues at;
-  model.evaluate(Eigen::VectorXd::Constant(1, shift), false, at);
+  model.evaluate(Eigen::VectorXd::Constant(1, shift), true, at);
   Eigen::VectorXd y = model.response();
   for (Eigen::Index r = 0; r < y.size(); ++r) {
     const double w = weights[r % weights.size()];
     at.columns.row(r) *= w;
+    at.columns_by[0].row(r) *= w;
     y[r] *= w;
   }
-  return at.columns.colPivHouseholderQr().solve(y);
+  const auto qr = at.columns.colPivHouseholderQr();
+  Shifted out{.theta = qr.solve(y), .residual = {}, .more = {}};
+  out.residual = y - at.columns * out.theta;
+  out.more = at.columns_by[0] * out.theta;
+  out.more -= at.columns * qr.solve(out.more);
+  return out;
+}
+
+// The score of a further shift at `from`, in standard errors that the residual at `to` gives it.
+double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
+  identify::BlockSums scores(1);
+  for (Eigen::Index k = 0; k < from.more.size(); k += outputs) {
+    scores.add(Eigen::VectorXd::Constant(1, from.more.segment(k, outputs).dot(to.residual.segment(k, outputs))));
+  }
+  const double variance = identify::long_run_covariance(scores).matrix(0, 0);
+  return variance > 0.0 ? from.more.dot(from.residual) / std::sqrt(variance) : 0.0;
 }
 
 std::string shift_words(const Setting& s, const EffortTiming& timing) {
@@ -598,7 +618,9 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     const double without = rss(nearest);
     timing.residual_ratio = without > 0.0 ? std::sqrt(found.weighted_rss / without) : 1.0;
     timing.mirror_ratio = without > 0.0 ? std::sqrt(rss(2.0 * nearest - timing.delay) / without) : 1.0;
-    const Eigen::VectorXd moved = (found.linear - at_shift(model, nearest, fit.weights)).cwiseAbs();
+    const Shifted taken = at_shift(model, nearest, fit.weights), shifted = at_shift(model, timing.delay, fit.weights);
+    timing.score = score_of(taken, shifted, static_cast<Eigen::Index>(s.model.n()));
+    const Eigen::VectorXd moved = (found.linear - taken.theta).cwiseAbs();
     for (std::size_t j = 0; j < s.model.p(); ++j) {
       const auto at = static_cast<Eigen::Index>(j);
       const double error = fit.residuals.standard_error[at];
@@ -613,9 +635,10 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
 }
 
 bool is_latency(const EffortTiming& timing, double step) {
-  const double shift = timing.beyond();
+  const double shift = timing.beyond(), score = timing.delay < timing.allowed.lower ? -timing.score : timing.score;
   return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error &&
-         timing.mirror_ratio > kMirror && (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
+         score > certain(timing.freedom) && timing.mirror_ratio > kMirror &&
+         (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
 }
 
 SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit& fit) {

@@ -60,7 +60,9 @@ struct EffortTiming {
                        ///< change between samples, up to a step more
   double residual_ratio = 1.0;  ///< rms residual with the shift over that with the nearest one that is allowed
   double mirror_ratio = 1.0;    ///< the same as far on the other side of that: above 1 for a true shift
-  double moved = 0.0;           ///< largest change of a parameter from the one to the other, in its standard errors
+  double score = 0.0;  ///< of a shift at the nearest one that is allowed, in its standard errors: its sign is that
+                       ///< of the shift, whatever interpolation makes of noise
+  double moved = 0.0;  ///< largest change of a parameter from the one to the other, in its standard errors
 
   /// s, how far the shift lies outside of what is allowed; 0 inside.
   [[nodiscard]] double beyond() const { return std::max({0.0, allowed.lower - delay, delay - allowed.upper}); }
@@ -73,7 +75,8 @@ struct EffortTiming {
 
 /// True if `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk
 /// of 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the
-/// sign of the shift (interpolation averages noise, which lowers the residual for a shift either way), and one that
+/// sign of the shift (interpolation averages noise, which lowers the residual for a shift either way, and makes a
+/// minimum half a step off look sharp: the score at the nearest shift that is allowed must tell it as well), and one that
 /// either lowers the residual by 1 % or more or moves a parameter by two standard errors. Healthy logs with even steps
 /// showed 0.09 steps at most.
 [[nodiscard]] bool is_latency(const EffortTiming& timing, double step);

@@ -127,6 +127,30 @@ TEST(UntoldNoise, WhatADriveDoesNotShowIsNotKnownFromIt) {
   }
 }
 
+// Of 8 s the robot drives 0.8 s: whatever that seems to say of the time between efforts and motion is chance.
+TEST(UntoldNoise, ABurstOfDrivingShowsNoLatency) {
+  for (const World& robot : kRobots) {
+    for (const Sensor sensor : {Sensor::counts, Sensor::white, Sensor::smooth}) {
+      for (const std::uint64_t seed : {1U, 10U}) {
+        World w = robot;
+        w.way = Way::standstill;
+        w.sensor = sensor;
+        w.step = 0.002;
+        w.noise = 0.01 * w.mass * w.radius;
+        const LogTable table = drive(w, seed);
+        TableSource log(table);
+        CommissionOptions options;
+        options.at_risk = CommissionOptions::AtRisk::nothing;
+        const Commissioning c = commission_robot(log, robot_of(w), options);
+        for (const LogContradiction& found : c.contradictions) {
+          EXPECT_FALSE(found.kind == LogContradiction::Kind::effort_timing && found.withdraws)
+              << w.mass << " kg, sensor " << static_cast<int>(sensor) << ", seed " << seed << ": " << found.sentence;
+        }
+      }
+    }
+  }
+}
+
 TEST(UntoldNoise, NorIsItWithMeasuredSpeeds) {
   for (World w : kRobots) {
     for (const Way way : {Way::straight, Way::circle, Way::standstill, Way::steady}) {
