@@ -383,10 +383,9 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
   if (origin.undecided) {
     origin.sentence = fmt::format(
         "{} cannot be told from wheel odometry, and is not taken for a measurement of its own: a combination of the "
-        "wheel "
-        "angles leaves {:.2g} rad of the heading over {:.3g} s, no more than lines between the samples of a pose that "
-        "repeats the wheels; if it is measured (camera, lidar, motion capture), write pose_source: independent in the "
-        "robot file",
+        "wheel angles leaves {:.2g} rad of the heading over {:.3g} s, no more than lines between the samples of a pose "
+        "that repeats the wheels; if it is measured (camera, lidar, motion capture), write pose_source: independent in "
+        "the robot file",
         m.position ? "the pose" : "the heading", origin.heading_rest, window);
   } else if (!by_stamps.empty()) {
     origin.sentence = fmt::format(
