@@ -458,7 +458,9 @@ std::string status_message(const Setting& s, const Commissioning& result) {
           "no parameters explain the log within the declared noise: it would have to be {:.3g} times as "
           "large; {}",
           result.minimax,
-          why.empty() ? "a fault, an effect that the model lacks, or noise bounds that are too small" : why);
+          why.empty()
+              ? "a fault, an effect that the model lacks (`gap` looks for it), or noise bounds that are too small"
+              : why);
     }
     case Commissioning::Status::contradicted: return "no model: " + withdrawal(result);
   }
