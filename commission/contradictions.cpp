@@ -347,14 +347,17 @@ void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, 
                          "same, and `gap` tells it"});
 }
 
-// The rows of `model` shifted by `shift`, weighted: θ, its residual, and what a further shift adds beyond θ.
+// The rows of `model` shifted by `shift`, weighted: θ, its residual, and what a further shift adds beyond θ. Nothing
+// outside of the shifts that the model is searched for.
 struct Shifted {
   Eigen::VectorXd theta, residual, more;
 };
 
-Shifted at_shift(const identify::TimeShiftedRows& model, double shift, const Eigen::VectorXd& weights) {
+std::optional<Shifted> at_shift(const identify::TimeShiftedRows& model, double shift, const Eigen::VectorXd& weights) {
   identify::SeparableValues at;
-  model.evaluate(Eigen::VectorXd::Constant(1, shift), true, at);
+  if (!model.evaluate(Eigen::VectorXd::Constant(1, shift), true, at)) {
+    return std::nullopt;
+  }
   Eigen::VectorXd y = model.response();
   for (Eigen::Index r = 0; r < y.size(); ++r) {
     const double w = weights[r % weights.size()];
@@ -599,11 +602,6 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
         std::abs(found.shape[0]) > kInside * longest) {
       return std::nullopt;
     }
-    const auto rss = [&](double shift) {
-      return identify::cost_curve(model, Eigen::VectorXd::Zero(1), 0, shift, shift + 1e-9, 2, fit.weights)
-          .front()
-          .weighted_rss;
-    };
     EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
     timing.allowed = s.measurement.delay;
     const bool held = s.measurement.hold == Hold::zero_order;
@@ -615,12 +613,16 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
       timing.allowed.lower -= held ? 0.0 : s.survey.median_step;
     }
     const double nearest = std::clamp(timing.delay, timing.allowed.lower, timing.allowed.upper);
-    const double without = rss(nearest);
-    timing.residual_ratio = without > 0.0 ? std::sqrt(found.weighted_rss / without) : 1.0;
-    timing.mirror_ratio = without > 0.0 ? std::sqrt(rss(2.0 * nearest - timing.delay) / without) : 1.0;
-    const Shifted taken = at_shift(model, nearest, fit.weights), shifted = at_shift(model, timing.delay, fit.weights);
-    timing.score = score_of(taken, shifted, static_cast<Eigen::Index>(s.model.n()));
-    const Eigen::VectorXd moved = (found.linear - taken.theta).cwiseAbs();
+    const auto taken = at_shift(model, nearest, fit.weights), shifted = at_shift(model, timing.delay, fit.weights),
+               mirrored = at_shift(model, 2.0 * nearest - timing.delay, fit.weights);
+    if (!taken || !shifted) {
+      return std::nullopt;  // what is allowed lies outside of what is searched
+    }
+    const double without = taken->residual.norm();
+    timing.residual_ratio = without > 0.0 ? std::sqrt(found.weighted_rss) / without : 1.0;
+    timing.mirror_ratio = without > 0.0 && mirrored ? mirrored->residual.norm() / without : 1.0;
+    timing.score = score_of(*taken, *shifted, static_cast<Eigen::Index>(s.model.n()));
+    const Eigen::VectorXd moved = (found.linear - taken->theta).cwiseAbs();
     for (std::size_t j = 0; j < s.model.p(); ++j) {
       const auto at = static_cast<Eigen::Index>(j);
       const double error = fit.residuals.standard_error[at];

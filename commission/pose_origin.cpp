@@ -367,7 +367,7 @@ PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& m, dou
       by_stamps = "from one rest to the next";
     } else if (const auto linear =
                    within_interpolation(kept, window, m.nominal_step, rounding_of(wheel_steps), decimals.quantum());
-               linear && !m.held_pose && !(!linear->decided && robot.pose_source == model::PoseSource::independent)) {
+               linear && !m.held_pose && (linear->decided || robot.pose_source != model::PoseSource::independent)) {
       origin.heading_rest = linear->rest;
       origin.undecided = !linear->decided;
       by_stamps = fmt::format("over {:.3g} s, no more than lines between the samples of a pose that repeats the wheels",

@@ -34,8 +34,9 @@ struct PoseOrigin {
 /// apart, θ̈ by the wheels: no sensor of its own stays within that where the robot hardly accelerates. Counts of the
 /// wheels are allowed for there, unless the heading's second differences are 1.2 times what these counts make, which is
 /// noise of its own. With fewer than four windows where all that is below 10⁻⁵ rad, an accurate sensor may do the same:
-/// this is undecided, and where the robot's pose_source is independent nothing is claimed. A way repeats the wheels below 10⁻⁵ m, and where the heading does. Nothing is claimed of fewer than eight
-/// windows, or of a robot that hardly turns (drives). Walks `log` once.
+/// this is undecided, and where the robot's pose_source is independent nothing is claimed. A way repeats the wheels
+/// below 10⁻⁵ m, and where the heading does. Nothing is claimed of fewer than eight windows, or of a robot that hardly
+/// turns (drives). Walks `log` once.
 [[nodiscard]] PoseOrigin pose_origin(LogSource& log, const filter::OdometryMeasurement& measurement, double window,
                                      const model::Robot& robot);
 
