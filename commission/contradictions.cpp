@@ -3,21 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/contradiction_search.hpp>
 #include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/identify/time_shift.hpp>
-#include <wheelwright/identify/variable_projection.hpp>
 
 namespace wheelwright::commission {
 
@@ -43,13 +39,7 @@ namespace {
 
 using Kind = LogContradiction::Kind;
 
-constexpr double kRiskOfWithdrawal =
-    1e-8;                                // two-sided, of Student's t: a model is withdrawn in error once in 10⁸ looks
-constexpr double kMaterial = 0.1;        // of the weighted effort: a wrong sign below it is a note
-constexpr double kLeastShift = 0.25;     // of a step: interpolation between samples leaves up to a tenth of one
-constexpr double kMovesParameter = 2.0;  // standard errors
-constexpr double kLowersResidual = 0.99;
-constexpr double kMirror = 1.001;          // a true shift is worse than none with its sign turned
+constexpr double kMaterial = 0.1;          // of the weighted effort: a wrong sign below it is a note
 constexpr double kUnrelated = 0.05;        // share of an effort's variation that motion must explain of it
 constexpr double kManyStepsOff = 0.2;      // of a step: how near half a step a shift must be to be one
 constexpr double kMuchRaised = 3.0;        // factor on an estimated noise bound
@@ -57,155 +47,6 @@ constexpr double kOwnMotion = 0.2;         // share of a column that is not the 
 constexpr double kWheelsDiffer = 1.15;     // ratio of the masses that two wheels show: worth a note
 constexpr double kWheelsContradict = 1.8;  // the same: a unit, a gear or a sensor is wrong
 constexpr double kManyOutside = 0.01;      // of the held-out instants
-constexpr std::size_t kFewestHalf = 200;   // instants of a half from which on it is looked at
-
-// Standard errors beyond which a difference is taken for real.
-double certain(double freedom) { return core::student_quantile(1.0 - kRiskOfWithdrawal, std::max(freedom, 1.0)); }
-
-// A column of the log over all rows.
-struct ColumnRange {
-  double least = std::numeric_limits<double>::infinity();
-  double most = -std::numeric_limits<double>::infinity();
-  [[nodiscard]] bool constant() const { return least == most; }
-};
-
-std::vector<ColumnRange> ranges_of(LogSource& log, const std::vector<std::string>& columns) {
-  std::vector<std::size_t> pick;
-  for (const std::string& column : columns) {
-    pick.push_back(*log.find(column));
-  }
-  std::vector<ColumnRange> ranges(columns.size());
-  LogBlock block;
-  log.rewind();
-  while (log.next(block)) {
-    for (std::size_t c = 0; c < pick.size() && block.rows() > 0; ++c) {
-      const auto [least, most] = std::ranges::minmax(block.columns[pick[c]]);
-      ranges[c] = {std::min(ranges[c].least, least), std::max(ranges[c].most, most)};
-    }
-  }
-  log.rewind();
-  return ranges;
-}
-
-void find_constant_efforts(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
-  const std::vector<ColumnRange> efforts = ranges_of(log, s.measurement.effort_columns);
-  const std::vector<ColumnRange> motions = ranges_of(log, s.measurement.motion_columns);
-  for (std::size_t j = 0; j < efforts.size(); ++j) {
-    if (efforts[j].constant() && !motions[j].constant()) {
-      const std::string& name = s.measurement.effort_columns[j];
-      out.push_back({.kind = Kind::effort_constant,
-                     .subject = name,
-                     .value = efforts[j].least,
-                     .sentence = fmt::format("{} is {:.6g} in every row although {} changes: no force is measured",
-                                             name, efforts[j].least, s.measurement.motion_columns[j]),
-                     .next = "check that the sensor is connected and that the right column is read (--map)"});
-    }
-  }
-}
-
-void find_wrapped_angles(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
-  constexpr double kHalfTurn = std::numbers::pi;
-  constexpr double kMoves = 0.25;  // of a half turn: at most this much otherwise between two rows
-  if (s.measurement.motion != MotionKind::angle) {
-    return;
-  }
-  const std::vector<ColumnRange> ranges = ranges_of(log, s.measurement.motion_columns);
-  for (std::size_t j = 0; j < ranges.size(); ++j) {
-    const std::string& name = s.measurement.motion_columns[j];
-    if (ranges[j].most - ranges[j].least > 2.0 * kHalfTurn * (1.0 + 1e-6)) {
-      continue;
-    }
-    const std::size_t column = *log.find(name);
-    double last = std::numeric_limits<double>::quiet_NaN(), least_jump = core::kInfinity, most_move = 0.0;
-    std::size_t jumps = 0;
-    LogBlock block;
-    log.rewind();
-    while (log.next(block)) {
-      for (const double value : block.columns[column]) {
-        const double moved = std::abs(value - last);
-        if (moved > kHalfTurn) {
-          ++jumps;
-          least_jump = std::min(least_jump, moved);
-        } else if (moved <= kHalfTurn) {
-          most_move = std::max(most_move, moved);
-        }
-        last = value;
-      }
-    }
-    if (jumps > 0 && most_move < kMoves * kHalfTurn) {
-      out.push_back({.kind = Kind::angle_wrapped,
-                     .subject = name,
-                     .value = least_jump,
-                     .limit = kHalfTurn,
-                     .sentence = fmt::format("{} stays within one turn and jumps by {:.3g} rad and more between two "
-                                             "rows, {} times: it is wrapped",
-                                             name, least_jump, jumps),
-                     .next = "unwrap the angle (numpy.unwrap) before commissioning; files are unwrapped on reading"});
-    }
-  }
-  log.rewind();
-}
-
-// A sample against the line through its neighbours, drawn over the stamps and over row numbers. Of angles: the speed of
-// a motor that follows its controller at once may well be a function of the controller's cycle.
-void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
-  constexpr double kEven = 0.02;     // relative: steps that differ by less are even
-  constexpr double kSmoother = 0.5;  // rms over row numbers over that over stamps
-  if (s.measurement.motion != MotionKind::angle) {
-    return;
-  }
-  std::vector<std::size_t> pick;
-  for (const std::string& column : s.measurement.motion_columns) {
-    pick.push_back(*log.find(column));
-  }
-  const double longest = s.measurement.longest_step();
-  std::vector<double> before(pick.size()), middle(pick.size());
-  double t_before = 0.0, t_middle = 0.0, by_stamp = 0.0, by_row = 0.0;
-  std::size_t known = 0, looked = 0;
-  LogBlock block;
-  log.rewind();
-  while (log.next(block)) {
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      const double t = block.t[k];
-      const bool starts =
-          std::ranges::binary_search(block.segment_starts, k) || (known > 0 && longest > 0.0 && t - t_middle > longest);
-      known = starts ? 0 : known;
-      if (known >= 2) {
-        const double a = t_middle - t_before, b = t - t_middle;
-        if (std::abs(a - b) > kEven * (a + b)) {
-          ++looked;
-          for (std::size_t c = 0; c < pick.size(); ++c) {
-            const double value = block.columns[pick[c]][k];
-            const double stamp = middle[c] - (before[c] * b + value * a) / (a + b);
-            const double row = middle[c] - 0.5 * (before[c] + value);
-            by_stamp += stamp * stamp;
-            by_row += row * row;
-          }
-        }
-      }
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        before[c] = middle[c];
-        middle[c] = block.columns[pick[c]][k];
-      }
-      t_before = t_middle;
-      t_middle = t;
-      ++known;
-    }
-  }
-  log.rewind();
-  const double ratio = by_stamp > 0.0 ? std::sqrt(by_row / by_stamp) : 1.0;
-  if (looked >= kFewestHalf && ratio < kSmoother) {
-    out.push_back(
-        {.kind = Kind::stamps_scatter,
-         .subject = "t",
-         .value = ratio,
-         .limit = kSmoother,
-         .sentence = fmt::format("the motion is {:.2g} times as rough over the stamps as over the row numbers: "
-                                 "the samples are even, their stamps scatter",
-                                 1.0 / std::max(ratio, std::numeric_limits<double>::min())),
-         .next = "stamp samples where they are taken, or number them: times that go up by the cycle's length"});
-  }
-}
 
 // The effort of each joint by itself, on all that the motion offers: what the rows say of it.
 struct JointFit {
@@ -345,42 +186,6 @@ void find_uneven_efforts(const Setting& s, const std::vector<JointFit>& joints, 
                                          right > left ? names[0] : names[1], ratio, right > left ? names[1] : names[0]),
                  .next = "check unit, gear and torque constant of both efforts; a load far beside the middle does the "
                          "same, and `gap` tells it"});
-}
-
-// The rows of `model` shifted by `shift`, weighted: θ, its residual, and what a further shift adds beyond θ. Nothing
-// outside of the shifts that the model is searched for.
-struct Shifted {
-  Eigen::VectorXd theta, residual, more;
-};
-
-std::optional<Shifted> at_shift(const identify::TimeShiftedRows& model, double shift, const Eigen::VectorXd& weights) {
-  identify::SeparableValues at;
-  if (!model.evaluate(Eigen::VectorXd::Constant(1, shift), true, at)) {
-    return std::nullopt;
-  }
-  Eigen::VectorXd y = model.response();
-  for (Eigen::Index r = 0; r < y.size(); ++r) {
-    const double w = weights[r % weights.size()];
-    at.columns.row(r) *= w;
-    at.columns_by[0].row(r) *= w;
-    y[r] *= w;
-  }
-  const auto qr = at.columns.colPivHouseholderQr();
-  Shifted out{.theta = qr.solve(y), .residual = {}, .more = {}};
-  out.residual = y - at.columns * out.theta;
-  out.more = at.columns_by[0] * out.theta;
-  out.more -= at.columns * qr.solve(out.more);
-  return out;
-}
-
-// The score of a further shift at `from`, in standard errors that the residual at `to` gives it.
-double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
-  identify::BlockSums scores(1);
-  for (Eigen::Index k = 0; k < from.more.size(); k += outputs) {
-    scores.add(Eigen::VectorXd::Constant(1, from.more.segment(k, outputs).dot(to.residual.segment(k, outputs))));
-  }
-  const double variance = identify::long_run_covariance(scores).matrix(0, 0);
-  return variance > 0.0 ? from.more.dot(from.residual) / std::sqrt(variance) : 0.0;
 }
 
 std::string shift_words(const Setting& s, const EffortTiming& timing) {
@@ -577,78 +382,10 @@ void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::v
 
 }  // namespace
 
-std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, const Fit& fit, double longest,
-                                          std::size_t most_rows) {
-  if (s.measurement.effort_unsigned) {
-    return std::nullopt;
-  }
-  Setting as_logged = s;  // a declared delay is compared with what is found, not taken away before
-  as_logged.measurement.delay = {0.0, 0.0};
-  TorqueRows stream = make_rows(log, as_logged, errors_of_fit(s));
-  RegressionBlock rows = first_rows(stream, most_rows);
-  log.rewind();
-  rows.dY.setZero();
-  rows.dy.setZero();
-  if (rows.instants() < kFewestHalf) {
-    return std::nullopt;
-  }
-  try {
-    const identify::TimeShiftedRows model(rows, identify::TimeEffect::delay, -longest, longest);
-    identify::VariableProjectionOptions options = model.options();
-    options.weights = fit.weights;
-    const identify::SeparableFit found = identify::variable_projection(model, options);
-    constexpr double kInside = 0.97;  // of the range that is searched: its end is no answer
-    if (found.end != identify::SearchEnd::converged || found.state[0] != identify::ShapeState::identified ||
-        std::abs(found.shape[0]) > kInside * longest) {
-      return std::nullopt;
-    }
-    EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
-    timing.allowed = s.measurement.delay;
-    const bool held = s.measurement.hold == Hold::zero_order;
-    const bool ranged = timing.allowed.lower != 0.0 || timing.allowed.upper != 0.0;
-    // As the rows' own hull: a value may come into force up to a step before its stamp; a measured one lies between
-    // two.
-    if (s.declared.between_samples && (ranged || (held && s.measurement.changes == model::EffortChanges::between))) {
-      timing.allowed.upper += s.survey.median_step;
-      timing.allowed.lower -= held ? 0.0 : s.survey.median_step;
-    }
-    const double nearest = std::clamp(timing.delay, timing.allowed.lower, timing.allowed.upper);
-    const auto taken = at_shift(model, nearest, fit.weights), shifted = at_shift(model, timing.delay, fit.weights),
-               mirrored = at_shift(model, 2.0 * nearest - timing.delay, fit.weights);
-    if (!taken || !shifted) {
-      return std::nullopt;  // what is allowed lies outside of what is searched
-    }
-    const double without = taken->residual.norm();
-    timing.residual_ratio = without > 0.0 ? std::sqrt(found.weighted_rss) / without : 1.0;
-    timing.mirror_ratio = without > 0.0 && mirrored ? mirrored->residual.norm() / without : 1.0;
-    timing.score = score_of(*taken, *shifted, static_cast<Eigen::Index>(s.model.n()));
-    const Eigen::VectorXd moved = (found.linear - taken->theta).cwiseAbs();
-    for (std::size_t j = 0; j < s.model.p(); ++j) {
-      const auto at = static_cast<Eigen::Index>(j);
-      const double error = fit.residuals.standard_error[at];
-      if (fit.excitation[j].state == identify::Excitation::identified && error > 0.0) {
-        timing.moved = std::max(timing.moved, moved[at] / error);
-      }
-    }
-    return timing;
-  } catch (const InvalidArgument&) {
-    return std::nullopt;  // segments shorter than the longest shift
-  }
-}
-
-bool is_latency(const EffortTiming& timing, double step) {
-  const double shift = timing.beyond(), score = timing.delay < timing.allowed.lower ? -timing.score : timing.score;
-  return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error &&
-         score > certain(timing.freedom) && timing.mirror_ratio > kMirror &&
-         (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
-}
-
 SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit& fit) {
   SignalFindings findings;
   std::vector<LogContradiction>& found = findings.contradictions;
-  find_wrapped_angles(log, s, found);
-  find_scattered_stamps(log, s, found);
-  find_constant_efforts(log, s, found);
+  find_raw_contradictions(log, s, found);
   const std::vector<JointFit> joints = fit_joints(log, s);
   find_unrelated_efforts(s, joints, found);
   if (found.empty()) {  // nothing else is worth a word beside a dead sensor

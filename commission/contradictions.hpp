@@ -76,9 +76,9 @@ struct EffortTiming {
 /// True if `timing` is a latency that a model must not be made with: beyond what is allowed, told from that at a risk
 /// of 1e-8 (Student's t) and further from it than a quarter of `step` (s), of an effect that is not symmetric in the
 /// sign of the shift (interpolation averages noise, which lowers the residual for a shift either way, and makes a
-/// minimum half a step off look sharp: the score at the nearest shift that is allowed must tell it as well), and one that
-/// either lowers the residual by 1 % or more or moves a parameter by two standard errors. Healthy logs with even steps
-/// showed 0.09 steps at most.
+/// minimum half a step off look sharp: the score at the nearest shift that is allowed must tell it as well), and one
+/// that either lowers the residual by 1 % or more or moves a parameter by two standard errors. Healthy logs with even
+/// steps showed 0.09 steps at most.
 [[nodiscard]] bool is_latency(const EffortTiming& timing, double step);
 
 /// Findings about the signals of a log, before any feasible set is computed.

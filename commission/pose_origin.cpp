@@ -190,8 +190,8 @@ struct WithinLines {
 };
 
 // What the wheels leave of a heading that is linear between stamps of its own, where that is no more than the
-// interpolation h²/8·|d²/dt²| at both ends of each window and a count of each wheel there, and the heading no rougher than
-// counts make it; nothing otherwise. h is that of the kinks: a sample bends the line at two rows at most.
+// interpolation h²/8·|d²/dt²| at both ends of each window and a count of each wheel there, and the heading no rougher
+// than counts make it; nothing otherwise. h is that of the kinks: a sample bends the line at two rows at most.
 std::optional<WithinLines> within_interpolation(const std::vector<Kept>& segments, double window, double step,
                                                 double count, double quantum) {
   Combination windows(count / std::sqrt(6.0));

@@ -21,11 +21,11 @@ using filter::SampleWeight;
 
 constexpr std::array<double, 5> kDelays = {1.0, 2.0, 4.0, 10.0, 30.0};         // in units of the shortest
 constexpr double kShortestInCorrelations = 1.0 / 3.0, kShortestInSteps = 4.0;  // the larger of both
-constexpr double kWindows = 20.0;          // of a delay that the log must hold for it to count
-constexpr int kMultiples = 12;             // λ, each twice the one before
-constexpr double kLargestVariance = 16.0;  // for which the first of them is the best, in units of that of q = bound
-constexpr double kRounding = 1e-10;        // relative, of eigenvalues
-constexpr double kStamps = 1e-6;           // relative, by which a correlation time is taken to be longer
+constexpr double kWindows = 20.0;              // of a delay that the log must hold for it to count
+constexpr int kMultiples = 12;                 // λ, each twice the one before
+constexpr double kLargestVariance = 16.0;      // for which the first of them is the best, in units of that of q = bound
+constexpr double kEigenvalueRounding = 1e-10;  // relative, of eigenvalues
+constexpr double kStamps = 1e-6;               // relative, by which a correlation time is taken to be longer
 
 // Means of old elements [torque | Y], by filters of order kOrder that delay by several times each. Elements come in
 // when all samples that they hold are older than all that the newest element holds, by the correlation time.
@@ -98,7 +98,7 @@ double most_below(const Eigen::MatrixXd& M) {
   const Eigen::MatrixXd half = 0.5 * (M + M.transpose());
   const double size = half.cwiseAbs().sum();
   const double least = core::symmetric_eigen(half).values.minCoeff();
-  return std::min(size, static_cast<double>(M.rows()) * std::max(-least, 0.0) + kRounding * size);
+  return std::min(size, static_cast<double>(M.rows()) * std::max(-least, 0.0) + kEigenvalueRounding * size);
 }
 
 // The most that errors which average out may add to S, but for the probability e^{−cost}.

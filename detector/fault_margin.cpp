@@ -17,7 +17,8 @@ constexpr double kNegligible = 1e-9;  // share of the largest size that is as go
 double largest_size(const Interval& side) { return std::max(std::abs(side.lower), std::abs(side.upper)); }
 double smallest_size(const Interval& side) { return std::max({0.0, side.lower, -side.upper}); }
 
-// Brackets the place where a function of κ, a quadratic on each of a few pieces, turns positive: f(below) <= 0 < f(above).
+// Brackets the place where a function of κ, a quadratic on each of a few pieces, turns positive: f(below) <= 0 and
+// f(above) > 0.
 class Crossing {
  public:
   Crossing(double at_zero, double above, double at_above) : below_{0.0, at_zero}, above_{above, at_above} {}
@@ -55,7 +56,7 @@ class Crossing {
   };
   static double slope(const Point& a, const Point& b) { return (b.f - a.f) / (b.kappa - a.kappa); }
 
-  // From `below_` on, of f(below) + u b + u² c: it is negative or 0 at 0, positive at the width, so one root is between.
+  // From `below_` on, of f(below) + u b + u² c: negative or 0 at 0, positive at the width, so one root is between.
   [[nodiscard]] double root_of_quadratic() const {
     const double c = (slope(*last_, above_) - slope(below_, above_)) / (last_->kappa - below_.kappa);
     const double b = slope(below_, above_) - width() * c;

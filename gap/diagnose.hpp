@@ -46,8 +46,8 @@ struct DiagnoseOptions {
 /// and what it leaves is the noise floor; effects that the healthy robot has already are taken as known. So are θ and
 /// effects of a simulator (`baseline_simulated`), of which the floor is what its log leaves beside the noise of the
 /// sensors of `log`. Without a baseline θ is nominal as far as the robot file says, and the floor is made of the
-/// sensors' noise. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; what the data say
-/// is in the result.
+/// sensors' noise. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; what the data
+/// say is in the result.
 [[nodiscard]] Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot,
                                  const DiagnoseOptions& options = {});
 

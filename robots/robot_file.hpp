@@ -29,8 +29,9 @@ namespace wheelwright::robots {
 ///     nominal: {physical name: value}, prior: {physical name: [lo, hi]},
 ///     noise: estimate | {wheel_speed, wheel_angle, effort, position, heading: bound | estimate},
 ///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto |
-///     encoder_difference | measured, pose_source: auto | independent, limits: {effort, speed, acceleration}, motor: {torque_constant, resistance,
-///     back_emf, gear_ratio}, effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp),
+///     encoder_difference | measured, pose_source: auto | independent, limits: {effort, speed, acceleration},
+///     motor: {torque_constant, resistance, back_emf, gear_ratio},
+///     effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp),
 ///     columns: {name: column}, which read_columns() hands out
 ///
 /// Physical names: mass, yaw_inertia, viscous_linear, viscous_yaw, coulomb (differential_drive; viscous_x and viscous_y

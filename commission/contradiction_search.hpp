@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// What the searches for contradictions have in common: when a difference is real, and what is found in raw signals.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include <wheelwright/commission/contradictions.hpp>
+#include <wheelwright/core/log.hpp>
+#include <wheelwright/core/statistics.hpp>
+
+namespace wheelwright::commission {
+
+/// Of a step: a shift in time below it is none, since interpolation between samples leaves up to a tenth of one.
+inline constexpr double kLeastShift = 0.25;
+
+/// Instants from which on a fit of a half, a joint or a shift is looked at.
+inline constexpr std::size_t kFewestHalf = 200;
+
+/// Standard errors beyond which a difference is taken for real: two-sided, of Student's t with `freedom` degrees of
+/// freedom, at a risk of 1e-8 (a model is withdrawn in error once in 10⁸ looks).
+[[nodiscard]] inline double certain(double freedom) {
+  constexpr double kRiskOfWithdrawal = 1e-8;
+  return core::student_quantile(1.0 - kRiskOfWithdrawal, std::max(freedom, 1.0));
+}
+
+/// Appends wrapped angles, scattered stamps and constant efforts, read from the columns as they are.
+void find_raw_contradictions(LogSource& log, const Setting& setting, std::vector<LogContradiction>& out);
+
+}  // namespace wheelwright::commission

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <wheelwright/commission/contradiction_search.hpp>
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/identify/time_shift.hpp>
+#include <wheelwright/identify/variable_projection.hpp>
+
+namespace wheelwright::commission {
+
+namespace {
+
+constexpr double kMovesParameter = 2.0;  // standard errors
+constexpr double kLowersResidual = 0.99;
+constexpr double kMirror = 1.001;  // a true shift is worse than none with its sign turned
+
+// The rows of `model` shifted by `shift`, weighted: θ, its residual, and what a further shift adds beyond θ. Nothing
+// outside of the shifts that the model is searched for.
+struct Shifted {
+  Eigen::VectorXd theta, residual, more;
+};
+
+std::optional<Shifted> at_shift(const identify::TimeShiftedRows& model, double shift, const Eigen::VectorXd& weights) {
+  identify::SeparableValues at;
+  if (!model.evaluate(Eigen::VectorXd::Constant(1, shift), true, at)) {
+    return std::nullopt;
+  }
+  Eigen::VectorXd y = model.response();
+  for (Eigen::Index r = 0; r < y.size(); ++r) {
+    const double w = weights[r % weights.size()];
+    at.columns.row(r) *= w;
+    at.columns_by[0].row(r) *= w;
+    y[r] *= w;
+  }
+  const auto qr = at.columns.colPivHouseholderQr();
+  Shifted out{.theta = qr.solve(y), .residual = {}, .more = {}};
+  out.residual = y - at.columns * out.theta;
+  out.more = at.columns_by[0] * out.theta;
+  out.more -= at.columns * qr.solve(out.more);
+  return out;
+}
+
+// The score of a further shift at `from`, in standard errors that the residual at `to` gives it.
+double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
+  identify::BlockSums scores(1);
+  for (Eigen::Index k = 0; k < from.more.size(); k += outputs) {
+    scores.add(Eigen::VectorXd::Constant(1, from.more.segment(k, outputs).dot(to.residual.segment(k, outputs))));
+  }
+  const double variance = identify::long_run_covariance(scores).matrix(0, 0);
+  return variance > 0.0 ? from.more.dot(from.residual) / std::sqrt(variance) : 0.0;
+}
+
+}  // namespace
+
+std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, const Fit& fit, double longest,
+                                          std::size_t most_rows) {
+  if (s.measurement.effort_unsigned) {
+    return std::nullopt;
+  }
+  Setting as_logged = s;  // a declared delay is compared with what is found, not taken away before
+  as_logged.measurement.delay = {0.0, 0.0};
+  TorqueRows stream = make_rows(log, as_logged, errors_of_fit(s));
+  RegressionBlock rows = first_rows(stream, most_rows);
+  log.rewind();
+  rows.dY.setZero();
+  rows.dy.setZero();
+  if (rows.instants() < kFewestHalf) {
+    return std::nullopt;
+  }
+  try {
+    const identify::TimeShiftedRows model(rows, identify::TimeEffect::delay, -longest, longest);
+    identify::VariableProjectionOptions options = model.options();
+    options.weights = fit.weights;
+    const identify::SeparableFit found = identify::variable_projection(model, options);
+    constexpr double kInside = 0.97;  // of the range that is searched: its end is no answer
+    if (found.end != identify::SearchEnd::converged || found.state[0] != identify::ShapeState::identified ||
+        std::abs(found.shape[0]) > kInside * longest) {
+      return std::nullopt;
+    }
+    EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
+    timing.allowed = s.measurement.delay;
+    const bool held = s.measurement.hold == Hold::zero_order;
+    const bool ranged = timing.allowed.lower != 0.0 || timing.allowed.upper != 0.0;
+    // As the rows' own hull: a value may come into force up to a step before its stamp; a measured one lies between
+    // two.
+    if (s.declared.between_samples && (ranged || (held && s.measurement.changes == model::EffortChanges::between))) {
+      timing.allowed.upper += s.survey.median_step;
+      timing.allowed.lower -= held ? 0.0 : s.survey.median_step;
+    }
+    const double nearest = std::clamp(timing.delay, timing.allowed.lower, timing.allowed.upper);
+    const auto taken = at_shift(model, nearest, fit.weights), shifted = at_shift(model, timing.delay, fit.weights),
+               mirrored = at_shift(model, 2.0 * nearest - timing.delay, fit.weights);
+    if (!taken || !shifted) {
+      return std::nullopt;  // what is allowed lies outside of what is searched
+    }
+    const double without = taken->residual.norm();
+    timing.residual_ratio = without > 0.0 ? std::sqrt(found.weighted_rss) / without : 1.0;
+    timing.mirror_ratio = without > 0.0 && mirrored ? mirrored->residual.norm() / without : 1.0;
+    timing.score = score_of(*taken, *shifted, static_cast<Eigen::Index>(s.model.n()));
+    const Eigen::VectorXd moved = (found.linear - taken->theta).cwiseAbs();
+    for (std::size_t j = 0; j < s.model.p(); ++j) {
+      const auto at = static_cast<Eigen::Index>(j);
+      const double error = fit.residuals.standard_error[at];
+      if (fit.excitation[j].state == identify::Excitation::identified && error > 0.0) {
+        timing.moved = std::max(timing.moved, moved[at] / error);
+      }
+    }
+    return timing;
+  } catch (const InvalidArgument&) {
+    return std::nullopt;  // segments shorter than the longest shift
+  }
+}
+
+bool is_latency(const EffortTiming& timing, double step) {
+  const double shift = timing.beyond(), score = timing.delay < timing.allowed.lower ? -timing.score : timing.score;
+  return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error &&
+         score > certain(timing.freedom) && timing.mirror_ratio > kMirror &&
+         (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
+}
+
+}  // namespace wheelwright::commission
