@@ -17,7 +17,7 @@ namespace wheelwright::commission {
 inline constexpr double kLeastShift = 0.25;
 
 /// Instants from which on a fit of a half, a joint or a shift is looked at.
-inline constexpr std::size_t kFewestHalf = 200;
+inline constexpr std::size_t kFewestInstants = 200;
 
 /// Standard errors beyond which a difference is taken for real: two-sided, of Student's t with `freedom` degrees of
 /// freedom, at a risk of 1e-8 (a model is withdrawn in error once in 10⁸ looks).

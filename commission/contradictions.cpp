@@ -112,7 +112,7 @@ std::vector<JointFit> fit_joints(LogSource& log, const Setting& s) {
     }
   };
   each([&](std::size_t j, const RegressionBlock& of_joint) { sums[j].add(of_joint); });
-  if (sums.front().instants() < kFewestHalf) {
+  if (sums.front().instants() < kFewestInstants) {
     return {};
   }
   std::vector<identify::LeastSquaresFit> fits;
@@ -332,7 +332,7 @@ void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::v
   };
   std::vector<identify::LeastSquares> sums(2, identify::LeastSquares(s.model.p(), fit.weights));
   each([&](std::size_t half, std::size_t first, std::size_t last) { sums[half].add(block, first, last); });
-  if (std::min(sums[0].instants(), sums[1].instants()) < kFewestHalf) {
+  if (std::min(sums[0].instants(), sums[1].instants()) < kFewestInstants) {
     return;
   }
   std::vector<bool> excluded;

@@ -66,7 +66,7 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
   log.rewind();
   rows.dY.setZero();
   rows.dy.setZero();
-  if (rows.instants() < kFewestHalf) {
+  if (rows.instants() < kFewestInstants) {
     return std::nullopt;
   }
   try {

@@ -19,8 +19,8 @@ using Kind = LogContradiction::Kind;
 
 // A column of the log over all rows.
 struct ColumnRange {
-  double least = std::numeric_limits<double>::infinity();
-  double most = -std::numeric_limits<double>::infinity();
+  double least = core::kInfinity;
+  double most = -core::kInfinity;
   [[nodiscard]] bool constant() const { return least == most; }
 };
 
@@ -42,9 +42,9 @@ std::vector<ColumnRange> ranges_of(LogSource& log, const std::vector<std::string
   return ranges;
 }
 
-void find_constant_efforts(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
+void find_constant_efforts(LogSource& log, const Setting& s, const std::vector<ColumnRange>& motions,
+                           std::vector<LogContradiction>& out) {
   const std::vector<ColumnRange> efforts = ranges_of(log, s.measurement.effort_columns);
-  const std::vector<ColumnRange> motions = ranges_of(log, s.measurement.motion_columns);
   for (std::size_t j = 0; j < efforts.size(); ++j) {
     if (efforts[j].constant() && !motions[j].constant()) {
       const std::string& name = s.measurement.effort_columns[j];
@@ -58,13 +58,13 @@ void find_constant_efforts(LogSource& log, const Setting& s, std::vector<LogCont
   }
 }
 
-void find_wrapped_angles(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
+void find_wrapped_angles(LogSource& log, const Setting& s, const std::vector<ColumnRange>& ranges,
+                         std::vector<LogContradiction>& out) {
   constexpr double kHalfTurn = std::numbers::pi;
   constexpr double kMoves = 0.25;  // of a half turn: at most this much otherwise between two rows
   if (s.measurement.motion != MotionKind::angle) {
     return;
   }
-  const std::vector<ColumnRange> ranges = ranges_of(log, s.measurement.motion_columns);
   for (std::size_t j = 0; j < ranges.size(); ++j) {
     const std::string& name = s.measurement.motion_columns[j];
     if (ranges[j].most - ranges[j].least > 2.0 * kHalfTurn * (1.0 + 1e-6)) {
@@ -149,7 +149,7 @@ void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogCont
   }
   log.rewind();
   const double ratio = by_stamp > 0.0 ? std::sqrt(by_row / by_stamp) : 1.0;
-  if (looked >= kFewestHalf && ratio < kSmoother) {
+  if (looked >= kFewestInstants && ratio < kSmoother) {
     out.push_back(
         {.kind = Kind::stamps_scatter,
          .subject = "t",
@@ -165,9 +165,10 @@ void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogCont
 }  // namespace
 
 void find_raw_contradictions(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
-  find_wrapped_angles(log, s, out);
+  const std::vector<ColumnRange> motions = ranges_of(log, s.measurement.motion_columns);
+  find_wrapped_angles(log, s, motions, out);
   find_scattered_stamps(log, s, out);
-  find_constant_efforts(log, s, out);
+  find_constant_efforts(log, s, motions, out);
 }
 
 }  // namespace wheelwright::commission
