@@ -68,8 +68,9 @@ struct EffortTiming {
   [[nodiscard]] double beyond() const { return std::max({0.0, allowed.lower - delay, delay - allowed.upper}); }
 };
 
-/// The shift that explains the first `most_rows` rows of `log` best, at most `longest` either way; nothing where none
-/// is told (flat, at the end of what is searched, segments too short, unsigned efforts).
+/// The shift that explains the first `most_rows` rows of `log` best, at most `longest` s beyond what is declared, or
+/// beyond that with its sign turned; nothing where none is told (flat, at the end of what is searched, segments too
+/// short, unsigned efforts). Ratios, score and moved are told of a shift that is beyond what is allowed.
 [[nodiscard]] std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& setting, const Fit& fit,
                                                         double longest = 0.2, std::size_t most_rows = 60000);
 

@@ -69,18 +69,21 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
   if (rows.instants() < kFewestInstants) {
     return std::nullopt;
   }
+  const Interval declared = s.measurement.delay;
+  const double reach = longest + core::magnitude(declared);  // its sign may be mistaken
   try {
-    const identify::TimeShiftedRows model(rows, identify::TimeEffect::delay, -longest, longest);
+    const identify::TimeShiftedRows model(rows, identify::TimeEffect::delay, -reach, reach);
     identify::VariableProjectionOptions options = model.options();
     options.weights = fit.weights;
+    options.scan = 1 + static_cast<int>(std::ceil((options.scan - 1) * reach / longest));
     const identify::SeparableFit found = identify::variable_projection(model, options);
     constexpr double kInside = 0.97;  // of the range that is searched: its end is no answer
     if (found.end != identify::SearchEnd::converged || found.state[0] != identify::ShapeState::identified ||
-        std::abs(found.shape[0]) > kInside * longest) {
+        std::abs(found.shape[0]) > kInside * reach) {
       return std::nullopt;
     }
     EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
-    timing.allowed = s.measurement.delay;
+    timing.allowed = declared;
     const bool held = s.measurement.hold == Hold::zero_order;
     const bool ranged = timing.allowed.lower != 0.0 || timing.allowed.upper != 0.0;
     // As the rows' own hull: a value may come into force up to a step before its stamp; a measured one lies between
@@ -89,11 +92,15 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
       timing.allowed.upper += s.survey.median_step;
       timing.allowed.lower -= held ? 0.0 : s.survey.median_step;
     }
+    if (timing.beyond() == 0.0) {
+      return timing;
+    }
     const double nearest = std::clamp(timing.delay, timing.allowed.lower, timing.allowed.upper);
+    const double mirror = std::clamp(2.0 * nearest - timing.delay, -reach, reach);
     const auto taken = at_shift(model, nearest, fit.weights), shifted = at_shift(model, timing.delay, fit.weights),
-               mirrored = at_shift(model, 2.0 * nearest - timing.delay, fit.weights);
+               mirrored = at_shift(model, mirror, fit.weights);
     if (!taken || !shifted) {
-      return std::nullopt;  // what is allowed lies outside of what is searched
+      return std::nullopt;
     }
     const double without = taken->residual.norm();
     timing.residual_ratio = without > 0.0 ? std::sqrt(found.weighted_rss) / without : 1.0;

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <optional>
 
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/identify/instruments.hpp>
 #include <wheelwright/identify/noise_level.hpp>
@@ -100,6 +103,21 @@ double t_quantile(const identify::ResidualSummary& summary) {
   return core::student_quantile(kConfidence, std::max(summary.freedom, 1.0));
 }
 
+// Why nothing is left of a log of many rows.
+std::string no_instant(const Setting& s) {
+  const filter::Measurement& m = s.measurement;
+  constexpr double kSteps = 4.0;  // that the filter looks at together
+  const double needed = kSteps * s.survey.median_step + std::max(m.delay.upper, 0.0) + std::max(-m.delay.lower, 0.0);
+  return fmt::format(
+      "log: no instant is left to fit: of its {} rows there are never {:.2g} s in a row without a step above {:.3g} "
+      "ms, "
+      "which counts as rows lost{}; log every sample, or resample the log evenly",
+      s.survey.rows, needed, 1e3 * m.longest_step(),
+      m.delay == Interval{} ? ""
+                            : fmt::format(" (the declared `effort: {{delay: [{:g}, {:g}]}}` needs that long)",
+                                          m.delay.lower, m.delay.upper));
+}
+
 }  // namespace
 
 identify::RegressionMoments log_moments(LogSource& log, const Setting& s, Part part) {
@@ -134,9 +152,14 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
   TorqueRows stream = make_rows(log, s, errors_of_fit(s));
   FoldedSource rows(stream, part, s.survey.rows, s.folds);
   RegressionBlock block;
+  std::size_t instants = 0;
   rows.rewind();
   while (rows.next(block)) {
     fit.factor.add(block);
+    instants += block.instants();
+  }
+  if (instants == 0) {
+    throw InvalidArgument(no_instant(s));
   }
 
   // Columns that never move or always move together are out at once; those that may be made of noise only where no

@@ -432,7 +432,11 @@ void check_delay(const HealthView& view, const commission::Setting& s, const com
   f.columns = s.measurement.effort_columns;
   f.value = delay;
   f.unit = std::string("s");
-  f.sentence = matters
+  const Interval declared_delay = s.measurement.delay;
+  f.sentence = declared_delay != Interval{} && timing->beyond() == 0.0
+                   ? fmt::format("The effort comes {:.2g} ± {:.1g} s {} the motion (95 %), as the robot file allows.",
+                                 std::abs(delay), 2.0 * error, delay > 0.0 ? "after" : "before")
+               : matters
                    ? fmt::format(
                          "The effort comes {:.2g} ± {:.1g} s {} the motion (95 %); shifted by that, {:.0f} % of the "
                          "residual are left.",

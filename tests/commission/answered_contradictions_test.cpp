@@ -6,6 +6,7 @@
 #include <random>
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -60,6 +61,22 @@ LogTable late(LogTable table, std::ptrdiff_t rows) {
     std::rotate(tau.begin(), rows > 0 ? tau.end() - rows : tau.begin() - rows, tau.end());
   }
   return core::slice(table, 20, table.rows() - 20);
+}
+
+// One row of `every` is lost.
+LogTable with_losses(const LogTable& table, std::size_t every = 500) {
+  LogTable out;
+  out.names = table.names;
+  out.columns.resize(table.columns.size());
+  for (std::size_t k = 0; k < table.rows(); ++k) {
+    if (k % every != every / 2) {
+      out.t.push_back(table.t[k]);
+      for (std::size_t c = 0; c < table.columns.size(); ++c) {
+        out.columns[c].push_back(table.columns[c][k]);
+      }
+    }
+  }
+  return out;
 }
 
 TEST(AnsweredContradiction, ADeadCurrentSensorIsNoRobotOfNoMass) {
@@ -225,6 +242,62 @@ TEST(AnsweredContradiction, ADeclaredDelayIsNone) {
   const Commissioning result = commissioned(table, s.robot);
   EXPECT_EQ(result.status, Status::done) << result.message;
   EXPECT_EQ(find(result, Kind::effort_timing), nullptr);
+}
+
+// 0.3 s is more than is looked for around none: it is looked for around what is declared. Efforts in N·m and in A, even
+// steps and steps with samples lost.
+TEST(AnsweredContradiction, ALongDelayIsHeldAgainstWhatIsDeclared) {
+  struct Case {
+    std::ptrdiff_t rows;  // of 10 ms, that efforts come late
+    Interval declared;    // s
+    bool told;
+  };
+  for (const Case& c : {Case{30, {0.295, 0.305}, false}, Case{-30, {-0.305, -0.295}, false},
+                        Case{30, {0.25, 0.27}, true}, Case{30, {0.34, 0.36}, true}, Case{-30, {0.295, 0.305}, true},
+                        Case{0, {0.25, 0.3}, true}, Case{0, {-0.3, -0.25}, true}}) {
+    for (const bool currents : {false, true}) {
+      for (const bool lossy : {false, true}) {
+        Scenario s = learnt_drive(8, 60.0);
+        LogTable table = late(simulate(s), c.rows);
+        if (currents) {
+          s.robot.effort = model::EffortKind::current;
+          for (std::string& name : table.names) {
+            if (name.starts_with("tau_")) {
+              std::ranges::transform(table.column(name), table.column(name).begin(), [](double y) { return y / 0.7; });
+              name.replace(0, 3, "current");
+            }
+          }
+        }
+        s.robot.effort_delay = c.declared;
+        if (lossy) {
+          s.robot.effort_changes = model::EffortChanges::between;
+          table = with_losses(table);
+        }
+        const Commissioning result = commissioned(table, s.robot);
+        const LogContradiction* found = find(result, Kind::effort_timing);
+        const std::string what =
+            fmt::format("{} rows late, declared {} to {} s{}{}: {}", c.rows, c.declared.lower, c.declared.upper,
+                        currents ? ", in A" : "", lossy ? ", samples lost" : "", result.message);
+        EXPECT_EQ(found != nullptr, c.told) << what;
+        if (found != nullptr) {
+          EXPECT_NEAR(found->value, 0.01 * static_cast<double>(c.rows), 0.006) << what;
+        }
+      }
+    }
+  }
+}
+
+TEST(AnsweredContradiction, ALogOfWhichNothingIsLeftSaysWhy) {
+  Scenario s = learnt_drive(8);
+  const LogTable table = with_losses(late(simulate(s), 30), 7);
+  s.robot.effort_delay = {0.295, 0.305};
+  try {
+    commissioned(table, s.robot);
+    FAIL() << "expected an error";
+  } catch (const InvalidArgument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("never 0.35 s in a row without a step above 17.5 ms"));
+    EXPECT_THAT(error.what(), HasSubstr("delay: [0.295, 0.305]"));
+  }
 }
 
 TEST(AnsweredContradiction, HealthyLogsHaveNone) {
