@@ -60,8 +60,8 @@ struct EffortTiming {
                        ///< change between samples, up to a step more
   double residual_ratio = 1.0;  ///< rms residual with the shift over that with the nearest one that is allowed
   double mirror_ratio = 1.0;    ///< the same as far on the other side of that: above 1 for a true shift
-  double score = 0.0;  ///< of a shift at the nearest one that is allowed, in its standard errors: its sign is that
-                       ///< of the shift, whatever interpolation makes of noise
+  double score = 0.0;  ///< of a shift at the nearest one that is allowed, as a multiple of what is told from none at a
+                       ///< risk of 1e-8: its sign is that of the shift, whatever interpolation makes of noise
   double moved = 0.0;  ///< largest change of a parameter from the one to the other, in its standard errors
 
   /// s, how far the shift lies outside of what is allowed; 0 inside.

@@ -42,14 +42,25 @@ std::optional<Shifted> at_shift(const identify::TimeShiftedRows& model, double s
   return out;
 }
 
-// The score of a further shift at `from`, in standard errors that the residual at `to` gives it.
+// The score of a further shift at `from`, as a multiple of what is certain by the residual at `to`. A shift that one ramp
+// alone shows is known by one look at the noise there; by noise that is the same on the whole log, it is known well.
 double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
-  identify::BlockSums scores(1);
+  identify::BlockSums scores(1), squares(1), errors(static_cast<std::size_t>(outputs));
+  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(outputs);
   for (Eigen::Index k = 0; k < from.more.size(); k += outputs) {
-    scores.add(Eigen::VectorXd::Constant(1, from.more.segment(k, outputs).dot(to.residual.segment(k, outputs))));
+    const auto more = from.more.segment(k, outputs), error = to.residual.segment(k, outputs);
+    scores.add(Eigen::VectorXd::Constant(1, more.dot(error)));
+    squares.add(Eigen::VectorXd::Constant(1, more.squaredNorm()));
+    errors.add(error);
+    sizes += more.cwiseAbs2();
   }
-  const double variance = identify::long_run_covariance(scores).matrix(0, 0);
-  return variance > 0.0 ? from.more.dot(from.residual) / std::sqrt(variance) : 0.0;
+  const identify::LongRunCovariance seen = identify::long_run_covariance(scores);
+  const Eigen::VectorXd of_sums = identify::long_run_covariance(errors).matrix.diagonal();
+  const double instants = static_cast<double>(from.more.size() / outputs);
+  const double stationary = std::max(seen.matrix(0, 0), of_sums.dot(sizes) / instants);
+  const double limit = std::min(certain(identify::effective_freedom(squares)) * std::sqrt(seen.matrix(0, 0)),
+                                certain(seen.freedom) * std::sqrt(stationary));
+  return limit > 0.0 ? from.more.dot(from.residual) / limit : 0.0;
 }
 
 }  // namespace
@@ -122,9 +133,8 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
 
 bool is_latency(const EffortTiming& timing, double step) {
   const double shift = timing.beyond(), score = timing.delay < timing.allowed.lower ? -timing.score : timing.score;
-  return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error &&
-         score > certain(timing.freedom) && timing.mirror_ratio > kMirror &&
-         (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
+  return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error && score > 1.0 &&
+         timing.mirror_ratio > kMirror && (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
 }
 
 }  // namespace wheelwright::commission

@@ -148,12 +148,17 @@ ResidualStatistics::ResidualStatistics(Eigen::VectorXd theta, Eigen::VectorXd we
       fourth_(outputs_.size()),
       torque_squares_(outputs_.size()),
       scores_(static_cast<std::size_t>(theta_.size())),
-      squared_(outputs_.size()) {}
+      squared_(outputs_.size()),
+      errors_(outputs_.size()),
+      grams_(outputs_.size(), Eigen::MatrixXd::Zero(theta_.size(), theta_.size())) {}
 
 void ResidualStatistics::add(const RegressionBlock& block, std::size_t first, std::size_t last) {
   check::that(block.outputs == outputs_.size(), "residual statistics", "one weight for each output");
   last = std::min(last, block.instants());
-  Eigen::VectorXd score(theta_.size()), square(weights_.size());
+  if (first >= last) {
+    return;
+  }
+  Eigen::VectorXd score(theta_.size()), square(weights_.size()), error(weights_.size());
   for (std::size_t k = first; k < last; ++k) {
     score.setZero();
     for (std::size_t i = 0; i < block.outputs; ++i) {
@@ -161,6 +166,7 @@ void ResidualStatistics::add(const RegressionBlock& block, std::size_t first, st
       const auto at = static_cast<Eigen::Index>(i);
       const double e = block.y[row] - block.Y.row(row).dot(theta_);
       score += weights_[at] * weights_[at] * e * block.Y.row(row).transpose();
+      error[at] = e;
       square[at] = e * e;
       squares_[i] += e * e;
       fourth_[i] += e * e * e * e;
@@ -173,7 +179,15 @@ void ResidualStatistics::add(const RegressionBlock& block, std::size_t first, st
     }
     scores_.add(score);
     squared_.add(square);
+    errors_.add(error);
     ++instants_;
+  }
+  const auto n = static_cast<Eigen::Index>(block.outputs), p = block.Y.cols();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Map<const core::RowMatrix, 0, Eigen::OuterStride<>> Y(
+        block.Y.data() + (static_cast<Eigen::Index>(first) * n + i) * p, static_cast<Eigen::Index>(last - first), p,
+        Eigen::OuterStride<>(n * p));
+    grams_[static_cast<std::size_t>(i)] += Y.transpose().lazyProduct(Y);
   }
 }
 
@@ -194,6 +208,13 @@ ResidualSummary ResidualStatistics::summary(const Eigen::MatrixXd& inverse_gram)
     o.effective_instants =
         of_mean > 0.0 ? std::clamp(2.0 * variance * variance / of_mean, std::min(4.0, count), count) : count;
   }
+  Eigen::MatrixXd stationary = Eigen::MatrixXd::Zero(theta_.size(), theta_.size());
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double of_sum = long_run_variance_of_sum(errors_, at);
+    stationary += std::pow(weights_[at], 4) * of_sum / count * grams_[i];
+  }
+  s.stationary_covariance = inverse_gram * stationary * inverse_gram;
   const LongRunCovariance scores = long_run_covariance(scores_);
   s.covariance = inverse_gram * scores.matrix * inverse_gram;
   s.standard_error = s.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();

@@ -78,6 +78,9 @@ struct ResidualSummary {
   Eigen::MatrixXd covariance;           ///< p × p, of θ̂, under autocorrelated residuals
   Eigen::VectorXd standard_error;       ///< p, roots of its diagonal
   double freedom = 0.0;                 ///< degrees of freedom of its Student's t
+  /// p × p, of the least-squares θ̂ if residuals were everywhere as large and as slow as they are on the whole log: told
+  /// from all of it, where `covariance` tells a column that is seen once from what is left of the noise there.
+  Eigen::MatrixXd stationary_covariance;
   std::size_t instants = 0;
 };
 
@@ -89,7 +92,8 @@ class ResidualStatistics {
   /// Adds instants [first, last) of `block`.
   void add(const RegressionBlock& block, std::size_t first = 0, std::size_t last = static_cast<std::size_t>(-1));
   /// The summary; `inverse_gram` is that of the fit. The covariance is the sandwich G⁻¹ Ω G⁻¹ with Ω the long-run
-  /// covariance of the scores w²Yᵀε (moments.hpp).
+  /// covariance of the scores w²Yᵀε (moments.hpp); the stationary one has Ω = Σ w⁴ S YᵀY over the outputs, with S the
+  /// long-run variance of ε at an instant.
   [[nodiscard]] ResidualSummary summary(const Eigen::MatrixXd& inverse_gram) const;
 
  private:
@@ -99,6 +103,8 @@ class ResidualStatistics {
   std::size_t instants_ = 0;
   BlockSums scores_;   // p
   BlockSums squared_;  // one for each output: ε²
+  BlockSums errors_;   // one for each output: ε
+  std::vector<Eigen::MatrixXd> grams_;
 };
 
 /// Excitation of one parameter by a log.

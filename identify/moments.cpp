@@ -36,6 +36,23 @@ void BlockSums::add(const Eigen::Ref<const Eigen::VectorXd>& value) {
   }
 }
 
+namespace {
+
+// Of the cosine estimator for so many blocks.
+std::size_t frequencies_for(Eigen::Index blocks, std::size_t most) {
+  const auto rule = static_cast<std::size_t>(0.4 * std::pow(static_cast<double>(blocks), 2.0 / 3.0));
+  return std::min<std::size_t>(std::clamp<std::size_t>(rule, 4, std::max<std::size_t>(most, 4)),
+                               static_cast<std::size_t>(blocks - 1));
+}
+
+double cosine(std::size_t frequency, Eigen::Index block, Eigen::Index blocks) {
+  const double phase = std::numbers::pi * static_cast<double>(frequency) * (static_cast<double>(block) + 0.5) /
+                       static_cast<double>(blocks);
+  return std::numbers::sqrt2 * std::cos(phase);
+}
+
+}  // namespace
+
 LongRunCovariance long_run_covariance(const Eigen::MatrixXd& block_sums, std::size_t most_frequencies) {
   const auto blocks = block_sums.cols();
   LongRunCovariance result;
@@ -43,16 +60,11 @@ LongRunCovariance long_run_covariance(const Eigen::MatrixXd& block_sums, std::si
   if (blocks < 2) {
     return result;
   }
-  const auto rule = static_cast<std::size_t>(0.4 * std::pow(static_cast<double>(blocks), 2.0 / 3.0));
-  const auto frequencies =
-      std::min<std::size_t>(std::clamp<std::size_t>(rule, 4, std::max<std::size_t>(most_frequencies, 4)),
-                            static_cast<std::size_t>(blocks - 1));
+  const std::size_t frequencies = frequencies_for(blocks, most_frequencies);
   for (std::size_t f = 1; f <= frequencies; ++f) {
     Eigen::VectorXd projection = Eigen::VectorXd::Zero(block_sums.rows());
     for (Eigen::Index k = 0; k < blocks; ++k) {
-      const double phase =
-          std::numbers::pi * static_cast<double>(f) * (static_cast<double>(k) + 0.5) / static_cast<double>(blocks);
-      projection += std::numbers::sqrt2 * std::cos(phase) * block_sums.col(k);
+      projection += cosine(f, k, blocks) * block_sums.col(k);
     }
     result.matrix += projection * projection.transpose();
   }
@@ -70,6 +82,26 @@ LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_
     result.matrix *= static_cast<double>(series.count()) / covered;
   }
   return result;
+}
+
+double effective_freedom(const BlockSums& squares, std::size_t most_frequencies) {
+  const Eigen::MatrixXd sums = squares.blocks();
+  const Eigen::Index blocks = sums.cols();
+  if (blocks < 2) {
+    return 0.0;
+  }
+  const std::size_t frequencies = frequencies_for(blocks, most_frequencies);
+  Eigen::MatrixXd M =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(frequencies), static_cast<Eigen::Index>(frequencies));
+  Eigen::VectorXd cosines(M.rows());
+  for (Eigen::Index k = 0; k < blocks; ++k) {
+    for (std::size_t f = 0; f < frequencies; ++f) {
+      cosines[static_cast<Eigen::Index>(f)] = cosine(f + 1, k, blocks);
+    }
+    M += sums(0, k) * cosines * cosines.transpose();
+  }
+  const double trace = M.trace();
+  return trace > 0.0 ? trace * trace / M.squaredNorm() : 0.0;
 }
 
 namespace {

@@ -227,7 +227,7 @@ Eigen::VectorXd largest_plausible_error(core::RegressionSource& rows, const Eige
   check::that(risk > 0.0 && risk < 1.0, "risk", "a number inside (0, 1)");
   const auto p = static_cast<double>(theta.size());
   const double f = core::fisher_upper_quantile(p, std::max(summary.freedom, 1.0), risk);
-  const Eigen::MatrixXd scaled = p * f * summary.covariance;
+  const Eigen::MatrixXd scaled = p * f * summary.covariance, stationary = p * f * summary.stationary_covariance;
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.outputs()));
   RegressionBlock block;
   rows.rewind();
@@ -235,7 +235,8 @@ Eigen::VectorXd largest_plausible_error(core::RegressionSource& rows, const Eige
     const auto n = static_cast<Eigen::Index>(block.outputs);
     for (Eigen::Index row = 0; row < block.rows(); ++row) {
       const double residual = std::abs(block.y[row] - block.Y.row(row).dot(theta));
-      const double variance = block.Y.row(row) * scaled * block.Y.row(row).transpose();
+      const double seen = block.Y.row(row) * scaled * block.Y.row(row).transpose();
+      const double variance = std::max(seen, block.Y.row(row).dot(block.Y.row(row) * stationary));
       largest[row % n] = std::max(largest[row % n], residual + std::sqrt(std::max(variance, 0.0)));
     }
   }

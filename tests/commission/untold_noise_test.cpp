@@ -14,7 +14,13 @@
 namespace wheelwright::commission {
 namespace {
 
-enum class Way { straight, circle, standstill, steady };  // steady: a circle at constant speed
+enum class Way {
+  straight,
+  circle,
+  standstill,
+  steady,
+  ramp
+};  // steady: a circle at constant speed; ramp: one, straight
 
 // Angles in whole counts, or speeds with white or with low-passed noise.
 enum class Sensor { counts, white, smooth };
@@ -27,6 +33,7 @@ struct World {
   Way way;
   Sensor sensor = Sensor::counts;
   double step = 0.01;  // s
+  double ramp = 1.0;   // s
 };
 
 LogTable drive(const World& w, std::uint64_t seed) {
@@ -50,9 +57,15 @@ LogTable drive(const World& w, std::uint64_t seed) {
       last = drives ? w.inertia * 3.0 * random.symmetric() : 0.0;
     }
     force = steady ? w.friction * v : force;
+    if (w.way == Way::ramp) {
+      force = w.friction * v + (k * h > 5.0 && k * h < 5.0 + w.ramp ? 0.5 * w.mass / w.ramp : 0.0);
+      last = 0.0;
+    }
     // On a circle of 1 m both speeds stay equal.
     const double circle = w.inertia * (force - w.friction * v) / w.mass + w.yaw_friction * v;
-    const double moment = w.way == Way::straight ? 0.0 : w.way == Way::circle || steady ? circle : last;
+    const double moment = w.way == Way::straight || w.way == Way::ramp ? 0.0
+                          : w.way == Way::circle || steady             ? circle
+                                                                       : last;
     log.t.push_back(k * h);
     for (std::size_t side = 0; side < 2; ++side) {
       const double sign = side == 0 ? 1.0 : -1.0;
@@ -145,6 +158,26 @@ TEST(UntoldNoise, ABurstOfDrivingShowsNoLatency) {
         for (const LogContradiction& found : c.contradictions) {
           EXPECT_FALSE(found.kind == LogContradiction::Kind::effort_timing && found.withdraws)
               << w.mass << " kg, sensor " << static_cast<int>(sensor) << ", seed " << seed << ": " << found.sentence;
+        }
+      }
+    }
+  }
+}
+
+// One ramp in a minute: least squares follows the noise there, so that little of it is left to judge by. Seeds of which
+// some showed a latency, others no longer held the mass or the yaw inertia.
+TEST(UntoldNoise, ASingleRampShowsNoLatencyAndHoldsTheTruth) {
+  for (const Sensor sensor : {Sensor::counts, Sensor::white}) {
+    for (const double ramp : {0.3, 1.0}) {
+      for (const double step : {0.02, 0.01, 0.005}) {
+        for (const std::uint64_t seed : {3U, 4U, 103U, 106U, 107U, 140U}) {
+          World w = kRobots[0];
+          w.way = Way::ramp;
+          w.ramp = ramp;
+          w.sensor = sensor;
+          w.step = step;
+          w.noise = 0.05 * w.mass * w.radius;
+          expect_the_truth(w, seed);
         }
       }
     }

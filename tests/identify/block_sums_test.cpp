@@ -115,6 +115,48 @@ TEST(LongRunCovariance, OfSeveralSeriesIsThatOfTheirCombinations) {
   EXPECT_NEAR(c.dot(matrix * c), expected, 1e-11 * expected);
 }
 
+// 2E²/var of the variance that is found, over many series of white Gaussian noise of the given sizes.
+double freedom_by_trial(const std::vector<double>& sizes) {
+  constexpr int runs = 20000;
+  double sum = 0.0, squares = 0.0;
+  Random random(17);
+  for (int run = 0; run < runs; ++run) {
+    BlockSums series(1);
+    for (const double size : sizes) {
+      series.add(Eigen::VectorXd::Constant(1, size * random.normal()));
+    }
+    const double variance = long_run_covariance(series).matrix(0, 0);
+    sum += variance;
+    squares += variance * variance;
+  }
+  const double mean = sum / runs;
+  return 2.0 * mean * mean / (squares / runs - mean * mean);
+}
+
+TEST(LongRunCovariance, FreedomIsThatOfTheStretchesThatCount) {
+  std::vector<double> even(100, 1.0), once(100, 0.0), drive(100, 0.1);
+  for (std::size_t k = 0; k < 100; ++k) {
+    once[k] = k >= 50 && k < 53 ? 1.0 : 0.0;
+    drive[k] = k % 25 < 5 ? 1.0 : 0.1;
+  }
+  const auto told = [](const std::vector<double>& sizes) {
+    BlockSums squares(1);
+    for (const double size : sizes) {
+      squares.add(Eigen::VectorXd::Constant(1, size * size));
+    }
+    return effective_freedom(squares);
+  };
+  BlockSums series(1);
+  for (const double size : even) {
+    series.add(Eigen::VectorXd::Constant(1, size));
+  }
+  EXPECT_NEAR(told(even), long_run_covariance(series).freedom, 1e-9);
+  EXPECT_LT(told(once), 1.2);
+  for (const std::vector<double>& sizes : {even, once, drive}) {
+    EXPECT_NEAR(told(sizes), freedom_by_trial(sizes), 0.05 * told(sizes));
+  }
+}
+
 TEST(LongRunCovariance, TooFewValuesGiveNoCovariance) {
   BlockSums sums(1);
   sums.add(Eigen::VectorXd::Constant(1, 3.0));

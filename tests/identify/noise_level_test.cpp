@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -146,6 +147,33 @@ TEST(LargestPlausibleError, CoversTheTrueOne) {
       EXPECT_GE(plausible, summary.outputs[0].largest);
     }
     EXPECT_GE(covered, runs * 99 / 100) << "phi " << phi;
+  }
+}
+
+// One ramp in the log: its column is seen in 20 to 80 rows of 1500, where the fit follows the noise.
+TEST(LargestPlausibleError, CoversTheTrueOneWhereAColumnIsSeenOnce) {
+  constexpr Eigen::Index count = 1500;
+  constexpr int runs = 1000;
+  for (const double phi : {0.0, 0.9, 0.97}) {
+    for (const double length : {20.0, 80.0}) {
+      int covered = 0;
+      for (std::uint64_t seed = 1; seed <= runs; ++seed) {
+        Autoregression noise(seed, phi);
+        const Eigen::MatrixXd Y = Eigen::MatrixXd::NullaryExpr(count, 2, [&](Eigen::Index k, Eigen::Index j) {
+          const double at = (static_cast<double>(k) - 700.0) / length;
+          return j == 0 ? 1.0 : at > 0.0 && at < 1.0 ? std::sin(std::numbers::pi * at) : 0.0;
+        });
+        const Eigen::VectorXd e = Eigen::VectorXd::NullaryExpr(count, [&] { return noise.next(); });
+        core::RegressionTable table(block_of(Y, Y * Eigen::Vector2d(1.0, 20.0) + e, 1));
+        const LeastSquaresFit fit = least_squares(table);
+        ResidualStatistics statistics(fit.estimate, Eigen::VectorXd::Ones(1));
+        statistics.add(table.block());
+        const double plausible =
+            largest_plausible_error(table, fit.estimate, statistics.summary(fit.inverse_gram), 0.01)[0];
+        covered += plausible >= e.cwiseAbs().maxCoeff() ? 1 : 0;
+      }
+      EXPECT_GE(covered, runs * 99 / 100) << "phi " << phi << ", " << length << " rows";
+    }
   }
 }
 

@@ -49,6 +49,31 @@ TEST(ResidualStatistics, AreThoseOfTheRows) {
   }
 }
 
+// A column that is seen in 30 rows of 3000 only: what the fit leaves of the noise there says less than all the rest.
+TEST(ResidualStatistics, StationaryCovarianceIsThatOfAColumnSeenOnce) {
+  constexpr double phi = 0.9;
+  constexpr int runs = 400;
+  double squares = 0.0, stationary = 0.0, seen = 0.0;
+  for (std::uint64_t seed = 1; seed <= runs; ++seed) {
+    Autoregression noise(seed, phi);
+    const Eigen::MatrixXd Y = Eigen::MatrixXd::NullaryExpr(
+        3000, 1, [](Eigen::Index k, Eigen::Index) { return k >= 1500 && k < 1530 ? 1.0 : 0.0; });
+    const Eigen::VectorXd e = Eigen::VectorXd::NullaryExpr(3000, [&] { return noise.next(); });
+    core::RegressionTable table(block_of(Y, Y + e, 1));
+    const LeastSquaresFit fit = least_squares(table);
+    ResidualStatistics statistics(fit.estimate, Eigen::VectorXd::Ones(1));
+    statistics.add(table.block());
+    const ResidualSummary s = statistics.summary(fit.inverse_gram);
+    squares += std::pow(fit.estimate[0] - 1.0, 2) / runs;
+    stationary += s.stationary_covariance(0, 0) / runs;
+    seen += s.covariance(0, 0) / runs;
+  }
+  // The mean of n values: (1 + φ)/(1 − φ) σ²/n for many, less for 30.
+  EXPECT_GT(stationary, squares);
+  EXPECT_LT(stationary, 1.6 * squares);
+  EXPECT_LT(seen, 0.5 * squares);
+}
+
 // Squares of AR(1) noise have the correlation φ^(2 lag): N (1 − φ²)/(1 + φ²) values know the variance as well as N
 // independent ones.
 TEST(ResidualStatistics, EffectiveInstantsAreThoseOfTheSquares) {
