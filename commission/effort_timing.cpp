@@ -58,8 +58,9 @@ double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
   const Eigen::VectorXd of_sums = identify::long_run_covariance(errors).matrix.diagonal();
   const double instants = static_cast<double>(from.more.size() / outputs);
   const double stationary = std::max(seen.matrix(0, 0), of_sums.dot(sizes) / instants);
-  const double limit = std::min(certain(identify::effective_freedom(squares)) * std::sqrt(seen.matrix(0, 0)),
-                                certain(seen.freedom) * std::sqrt(stationary));
+  const double limit =
+      std::min(certain(identify::effective_freedom(squares.blocks().row(0))) * std::sqrt(seen.matrix(0, 0)),
+               certain(seen.freedom) * std::sqrt(stationary));
   return limit > 0.0 ? from.more.dot(from.residual) / limit : 0.0;
 }
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 
 namespace wheelwright::identify {
@@ -150,15 +151,13 @@ ResidualStatistics::ResidualStatistics(Eigen::VectorXd theta, Eigen::VectorXd we
       scores_(static_cast<std::size_t>(theta_.size())),
       squared_(outputs_.size()),
       errors_(outputs_.size()),
-      grams_(outputs_.size(), Eigen::MatrixXd::Zero(theta_.size(), theta_.size())) {}
+      grams_(outputs_.size() * static_cast<std::size_t>(theta_.size() * theta_.size())) {}
 
 void ResidualStatistics::add(const RegressionBlock& block, std::size_t first, std::size_t last) {
   check::that(block.outputs == outputs_.size(), "residual statistics", "one weight for each output");
   last = std::min(last, block.instants());
-  if (first >= last) {
-    return;
-  }
-  Eigen::VectorXd score(theta_.size()), square(weights_.size()), error(weights_.size());
+  const Eigen::Index p = theta_.size();
+  Eigen::VectorXd score(p), square(weights_.size()), error(weights_.size()), gram(weights_.size() * p * p);
   for (std::size_t k = first; k < last; ++k) {
     score.setZero();
     for (std::size_t i = 0; i < block.outputs; ++i) {
@@ -167,6 +166,7 @@ void ResidualStatistics::add(const RegressionBlock& block, std::size_t first, st
       const double e = block.y[row] - block.Y.row(row).dot(theta_);
       score += weights_[at] * weights_[at] * e * block.Y.row(row).transpose();
       error[at] = e;
+      Eigen::Map<Eigen::MatrixXd>(gram.data() + at * p * p, p, p) = block.Y.row(row).transpose() * block.Y.row(row);
       square[at] = e * e;
       squares_[i] += e * e;
       fourth_[i] += e * e * e * e;
@@ -180,14 +180,39 @@ void ResidualStatistics::add(const RegressionBlock& block, std::size_t first, st
     scores_.add(score);
     squared_.add(square);
     errors_.add(error);
+    grams_.add(gram);
     ++instants_;
   }
-  const auto n = static_cast<Eigen::Index>(block.outputs), p = block.Y.cols();
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const Eigen::Map<const core::RowMatrix, 0, Eigen::OuterStride<>> Y(
-        block.Y.data() + (static_cast<Eigen::Index>(first) * n + i) * p, static_cast<Eigen::Index>(last - first), p,
-        Eigen::OuterStride<>(n * p));
-    grams_[static_cast<std::size_t>(i)] += Y.transpose().lazyProduct(Y);
+}
+
+void ResidualStatistics::know_errors(ResidualSummary& s, const Eigen::MatrixXd& inverse_gram) const {
+  const Eigen::Index p = theta_.size();
+  const Eigen::MatrixXd grams = grams_.blocks();
+  const auto count = static_cast<double>(instants_);
+  const double share = grams.cols() > 0 ? static_cast<double>(grams.cols() * grams_.block_length()) / count : 1.0;
+  const auto of_block = [&](Eigen::Index i, Eigen::Index b) {
+    return Eigen::Map<const Eigen::MatrixXd>(grams.col(b).data() + i * p * p, p, p);
+  };
+  Eigen::MatrixXd scores = Eigen::MatrixXd::Zero(p, p), squares = Eigen::MatrixXd::Zero(p, grams.cols());
+  std::vector<Eigen::MatrixXd> totals;
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double at_an_instant = std::pow(weights_[at], 4) * long_run_variance_of_sum(errors_, at) / count;
+    totals.emplace_back(Eigen::MatrixXd::Zero(p, p));
+    for (Eigen::Index b = 0; b < grams.cols(); ++b) {
+      totals[i] += of_block(at, b) / share;
+      squares.col(b) += at_an_instant * (inverse_gram * of_block(at, b) * inverse_gram).diagonal();
+    }
+    scores += at_an_instant * totals[i];
+  }
+  s.stationary_covariance = inverse_gram * scores * inverse_gram;
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    double& freedom = s.outputs[i].fit_freedom = core::kInfinity;
+    for (Eigen::Index j = 0; j < p; ++j) {
+      if (totals[i](j, j) > 0.0 && inverse_gram(j, j) > 0.0) {
+        freedom = std::min(freedom, effective_freedom(squares.row(j)));
+      }
+    }
   }
 }
 
@@ -208,13 +233,7 @@ ResidualSummary ResidualStatistics::summary(const Eigen::MatrixXd& inverse_gram)
     o.effective_instants =
         of_mean > 0.0 ? std::clamp(2.0 * variance * variance / of_mean, std::min(4.0, count), count) : count;
   }
-  Eigen::MatrixXd stationary = Eigen::MatrixXd::Zero(theta_.size(), theta_.size());
-  for (std::size_t i = 0; i < outputs_.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    const double of_sum = long_run_variance_of_sum(errors_, at);
-    stationary += std::pow(weights_[at], 4) * of_sum / count * grams_[i];
-  }
-  s.stationary_covariance = inverse_gram * stationary * inverse_gram;
+  know_errors(s, inverse_gram);
   const LongRunCovariance scores = long_run_covariance(scores_);
   s.covariance = inverse_gram * scores.matrix * inverse_gram;
   s.standard_error = s.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();

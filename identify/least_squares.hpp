@@ -70,6 +70,8 @@ struct OutputResidual {
   double largest_time = 0.0;        ///< its time, s
   double kurtosis = 0.0;            ///< E ε⁴/(E ε²)²; 3 for Gaussian noise
   double effective_instants = 0.0;  ///< number of independent Gaussian values that would know the variance as well
+  double fit_freedom = 0.0;  ///< degrees of freedom with which the errors of its parameters are known from residuals
+                             ///< where they are seen: the least over them (effective_freedom())
 };
 
 /// Residual statistics of a fit over a log.
@@ -97,6 +99,8 @@ class ResidualStatistics {
   [[nodiscard]] ResidualSummary summary(const Eigen::MatrixXd& inverse_gram) const;
 
  private:
+  void know_errors(ResidualSummary& s, const Eigen::MatrixXd& inverse_gram) const;
+
   Eigen::VectorXd theta_, weights_;
   std::vector<OutputResidual> outputs_;
   std::vector<double> squares_, fourth_, torque_squares_;
@@ -104,7 +108,7 @@ class ResidualStatistics {
   BlockSums scores_;   // p
   BlockSums squared_;  // one for each output: ε²
   BlockSums errors_;   // one for each output: ε
-  std::vector<Eigen::MatrixXd> grams_;
+  BlockSums grams_;    // p × p for each output: YᵀY
 };
 
 /// Excitation of one parameter by a log.

@@ -84,9 +84,8 @@ LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_
   return result;
 }
 
-double effective_freedom(const BlockSums& squares, std::size_t most_frequencies) {
-  const Eigen::MatrixXd sums = squares.blocks();
-  const Eigen::Index blocks = sums.cols();
+double effective_freedom(const Eigen::RowVectorXd& squares, std::size_t most_frequencies) {
+  const Eigen::Index blocks = squares.size();
   if (blocks < 2) {
     return 0.0;
   }
@@ -98,7 +97,7 @@ double effective_freedom(const BlockSums& squares, std::size_t most_frequencies)
     for (std::size_t f = 0; f < frequencies; ++f) {
       cosines[static_cast<Eigen::Index>(f)] = cosine(f + 1, k, blocks);
     }
-    M += sums(0, k) * cosines * cosines.transpose();
+    M += squares[k] * cosines * cosines.transpose();
   }
   const double trace = M.trace();
   return trace > 0.0 ? trace * trace / M.squaredNorm() : 0.0;

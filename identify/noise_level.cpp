@@ -226,8 +226,12 @@ Eigen::VectorXd largest_plausible_error(core::RegressionSource& rows, const Eige
                                         const ResidualSummary& summary, double risk) {
   check::that(risk > 0.0 && risk < 1.0, "risk", "a number inside (0, 1)");
   const auto p = static_cast<double>(theta.size());
-  const double f = core::fisher_upper_quantile(p, std::max(summary.freedom, 1.0), risk);
-  const Eigen::MatrixXd scaled = p * f * summary.covariance, stationary = p * f * summary.stationary_covariance;
+  const auto scheffe = [&](double freedom) { return p * core::fisher_upper_quantile(p, std::max(freedom, 1.0), risk); };
+  const double everywhere = scheffe(summary.freedom);
+  std::vector<double> where_seen;
+  for (const OutputResidual& output : summary.outputs) {
+    where_seen.push_back(scheffe(std::min(output.fit_freedom, summary.freedom)));
+  }
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.outputs()));
   RegressionBlock block;
   rows.rewind();
@@ -235,8 +239,11 @@ Eigen::VectorXd largest_plausible_error(core::RegressionSource& rows, const Eige
     const auto n = static_cast<Eigen::Index>(block.outputs);
     for (Eigen::Index row = 0; row < block.rows(); ++row) {
       const double residual = std::abs(block.y[row] - block.Y.row(row).dot(theta));
-      const double seen = block.Y.row(row) * scaled * block.Y.row(row).transpose();
-      const double variance = std::max(seen, block.Y.row(row).dot(block.Y.row(row) * stationary));
+      const auto of = [&](const Eigen::MatrixXd& covariance) {
+        return block.Y.row(row).dot(block.Y.row(row) * covariance);
+      };
+      const double variance = std::max(where_seen[static_cast<std::size_t>(row % n)] * of(summary.covariance),
+                                       everywhere * of(summary.stationary_covariance));
       largest[row % n] = std::max(largest[row % n], residual + std::sqrt(std::max(variance, 0.0)));
     }
   }

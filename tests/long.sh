@@ -25,7 +25,7 @@ for part in ${*:-slow campaign sanitizers}; do
       ;;
     sanitizers)
       tools/build.sh asan
-      ctest --preset asan --output-on-failure --no-tests=error -j "$jobs"
+      tests/sanitized.py "$jobs"
       ;;
     fuzz)
       case ${2:-} in [0-9]*) fuzz_seconds=$2 ;; esac

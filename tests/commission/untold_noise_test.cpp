@@ -32,8 +32,9 @@ struct World {
   double noise;   // of torques, N·m
   Way way;
   Sensor sensor = Sensor::counts;
-  double step = 0.01;  // s
-  double ramp = 1.0;   // s
+  double step = 0.01;         // s
+  double ramp = 1.0;          // s
+  double proportional = 0.0;  // of the torque: further noise
 };
 
 LogTable drive(const World& w, std::uint64_t seed) {
@@ -74,8 +75,8 @@ LogTable drive(const World& w, std::uint64_t seed) {
       log.columns[side].push_back(w.sensor == Sensor::counts
                                       ? std::round(angle[side] / count) * count
                                       : (v + sign * 0.5 * w.track * turning) / w.radius + low[side]);
-      log.columns[2 + side].push_back(0.5 * w.radius * (force + sign * 2.0 * moment / w.track) +
-                                      w.noise * random.symmetric());
+      const double torque = 0.5 * w.radius * (force + sign * 2.0 * moment / w.track);
+      log.columns[2 + side].push_back(torque + (w.noise + w.proportional * std::abs(torque)) * random.symmetric());
     }
     // x' = (u − c x)/m over h: the new speed, and the way.
     const auto step = [&](double& speed, double m, double c, double u) {
@@ -177,6 +178,26 @@ TEST(UntoldNoise, ASingleRampShowsNoLatencyAndHoldsTheTruth) {
           w.sensor = sensor;
           w.step = step;
           w.noise = 0.05 * w.mass * w.radius;
+          expect_the_truth(w, seed);
+        }
+      }
+    }
+  }
+}
+
+// Efforts whose noise grows with them: what a log shows while the robot stands says nothing of it.
+TEST(UntoldNoise, NoiseInProportionToTheEffortHoldsTheTruthToo) {
+  for (const Way way : {Way::ramp, Way::standstill, Way::straight, Way::circle}) {
+    for (const double step : {0.02, 0.01, 0.005}) {
+      for (const double proportional : {0.05, 0.2}) {
+        for (std::uint64_t seed = 401; seed <= 406; ++seed) {
+          World w = kRobots[0];
+          w.way = way;
+          w.ramp = 0.3;
+          w.sensor = Sensor::white;
+          w.step = step;
+          w.noise = 0.005 * w.mass * w.radius;
+          w.proportional = proportional;
           expect_the_truth(w, seed);
         }
       }
