@@ -59,7 +59,8 @@ double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
   const double instants = static_cast<double>(from.more.size() / outputs);
   const double stationary = std::max(seen.matrix(0, 0), of_sums.dot(sizes) / instants);
   const double limit =
-      std::min(certain(identify::effective_freedom(squares.blocks().row(0))) * std::sqrt(seen.matrix(0, 0)),
+      std::min(certain(identify::effective_freedom(squares.blocks().row(0), static_cast<std::size_t>(seen.freedom))) *
+                   std::sqrt(seen.matrix(0, 0)),
                certain(seen.freedom) * std::sqrt(stationary));
   return limit > 0.0 ? from.more.dot(from.residual) / limit : 0.0;
 }

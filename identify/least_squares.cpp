@@ -12,6 +12,7 @@
 namespace wheelwright::identify {
 namespace {
 
+constexpr std::size_t kStretches = 64;    // at least, of which it is known how much they say about a parameter
 constexpr Eigen::Index kBatch = 256;      // rows folded at a time
 constexpr double kRankTolerance = 1e-10;  // of the largest singular value of unit columns
 
@@ -151,7 +152,7 @@ ResidualStatistics::ResidualStatistics(Eigen::VectorXd theta, Eigen::VectorXd we
       scores_(static_cast<std::size_t>(theta_.size())),
       squared_(outputs_.size()),
       errors_(outputs_.size()),
-      grams_(outputs_.size() * static_cast<std::size_t>(theta_.size() * theta_.size())) {}
+      grams_(outputs_.size() * static_cast<std::size_t>(theta_.size() * theta_.size()), kStretches) {}
 
 void ResidualStatistics::add(const RegressionBlock& block, std::size_t first, std::size_t last) {
   check::that(block.outputs == outputs_.size(), "residual statistics", "one weight for each output");
@@ -210,7 +211,7 @@ void ResidualStatistics::know_errors(ResidualSummary& s, const Eigen::MatrixXd& 
     double& freedom = s.outputs[i].fit_freedom = core::kInfinity;
     for (Eigen::Index j = 0; j < p; ++j) {
       if (totals[i](j, j) > 0.0 && inverse_gram(j, j) > 0.0) {
-        freedom = std::min(freedom, effective_freedom(squares.row(j)));
+        freedom = std::min(freedom, effective_freedom(squares.row(j), static_cast<std::size_t>(s.freedom)));
       }
     }
   }
@@ -233,11 +234,11 @@ ResidualSummary ResidualStatistics::summary(const Eigen::MatrixXd& inverse_gram)
     o.effective_instants =
         of_mean > 0.0 ? std::clamp(2.0 * variance * variance / of_mean, std::min(4.0, count), count) : count;
   }
-  know_errors(s, inverse_gram);
   const LongRunCovariance scores = long_run_covariance(scores_);
   s.covariance = inverse_gram * scores.matrix * inverse_gram;
   s.standard_error = s.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   s.freedom = scores.freedom;
+  know_errors(s, inverse_gram);
   return s;
 }
 

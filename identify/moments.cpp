@@ -38,13 +38,6 @@ void BlockSums::add(const Eigen::Ref<const Eigen::VectorXd>& value) {
 
 namespace {
 
-// Of the cosine estimator for so many blocks.
-std::size_t frequencies_for(Eigen::Index blocks, std::size_t most) {
-  const auto rule = static_cast<std::size_t>(0.4 * std::pow(static_cast<double>(blocks), 2.0 / 3.0));
-  return std::min<std::size_t>(std::clamp<std::size_t>(rule, 4, std::max<std::size_t>(most, 4)),
-                               static_cast<std::size_t>(blocks - 1));
-}
-
 double cosine(std::size_t frequency, Eigen::Index block, Eigen::Index blocks) {
   const double phase = std::numbers::pi * static_cast<double>(frequency) * (static_cast<double>(block) + 0.5) /
                        static_cast<double>(blocks);
@@ -60,7 +53,10 @@ LongRunCovariance long_run_covariance(const Eigen::MatrixXd& block_sums, std::si
   if (blocks < 2) {
     return result;
   }
-  const std::size_t frequencies = frequencies_for(blocks, most_frequencies);
+  const auto rule = static_cast<std::size_t>(0.4 * std::pow(static_cast<double>(blocks), 2.0 / 3.0));
+  const auto frequencies =
+      std::min<std::size_t>(std::clamp<std::size_t>(rule, 4, std::max<std::size_t>(most_frequencies, 4)),
+                            static_cast<std::size_t>(blocks - 1));
   for (std::size_t f = 1; f <= frequencies; ++f) {
     Eigen::VectorXd projection = Eigen::VectorXd::Zero(block_sums.rows());
     for (Eigen::Index k = 0; k < blocks; ++k) {
@@ -84,12 +80,12 @@ LongRunCovariance long_run_covariance(const BlockSums& series, std::size_t most_
   return result;
 }
 
-double effective_freedom(const Eigen::RowVectorXd& squares, std::size_t most_frequencies) {
+double effective_freedom(const Eigen::RowVectorXd& squares, std::size_t frequencies) {
   const Eigen::Index blocks = squares.size();
   if (blocks < 2) {
     return 0.0;
   }
-  const std::size_t frequencies = frequencies_for(blocks, most_frequencies);
+  frequencies = std::min(frequencies, static_cast<std::size_t>(blocks - 1));
   Eigen::MatrixXd M =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(frequencies), static_cast<Eigen::Index>(frequencies));
   Eigen::VectorXd cosines(M.rows());

@@ -144,7 +144,7 @@ TEST(LongRunCovariance, FreedomIsThatOfTheStretchesThatCount) {
     for (const double size : sizes) {
       squares.add(Eigen::VectorXd::Constant(1, size * size));
     }
-    return effective_freedom(squares.blocks().row(0));
+    return effective_freedom(squares.blocks().row(0), static_cast<std::size_t>(long_run_covariance(squares).freedom));
   };
   BlockSums series(1);
   for (const double size : even) {
