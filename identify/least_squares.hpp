@@ -80,8 +80,8 @@ struct ResidualSummary {
   Eigen::MatrixXd covariance;           ///< p × p, of θ̂, under autocorrelated residuals
   Eigen::VectorXd standard_error;       ///< p, roots of its diagonal
   double freedom = 0.0;                 ///< degrees of freedom of its Student's t
-  /// p × p, of the least-squares θ̂ if residuals were everywhere as large and as slow as they are on the whole log: told
-  /// from all of it, where `covariance` tells a column that is seen once from what is left of the noise there.
+  /// p × p, of the least-squares θ̂ if residuals were everywhere as large and as slow as they are on the whole log:
+  /// told from all of it, where `covariance` tells a column that is seen once from what is left of the noise there.
   Eigen::MatrixXd stationary_covariance;
   std::size_t instants = 0;
 };
