@@ -43,7 +43,8 @@ std::optional<Shifted> at_shift(const identify::TimeShiftedRows& model, double s
 }
 
 // The score of a further shift at `from`, as a multiple of what is certain by the residual at `to`. A shift that one
-// ramp alone shows is known by one look at the noise there; by noise that is the same on the whole log, it is known well.
+// ramp alone shows is known by one look at the noise there; by noise that is the same on the whole log, it is known
+// well.
 double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
   identify::BlockSums scores(1), squares(1), errors(static_cast<std::size_t>(outputs));
   Eigen::VectorXd sizes = Eigen::VectorXd::Zero(outputs);

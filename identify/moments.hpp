@@ -56,9 +56,9 @@ struct LongRunCovariance {
 [[nodiscard]] LongRunCovariance long_run_covariance(const Eigen::MatrixXd& block_sums,
                                                     std::size_t most_frequencies = 24);
 
-/// Degrees of freedom that long_run_covariance() by so many `frequencies` has for a series whose squares are expected in
-/// proportion to `squares`, summed over its blocks of time: those of a series that is as large everywhere, and about one
-/// where nearly all of it lies in one stretch (Satterthwaite: (tr M)²/tr M², M the covariance of the cosines'
+/// Degrees of freedom that long_run_covariance() by so many `frequencies` has for a series whose squares are expected
+/// in proportion to `squares`, summed over its blocks of time: those of a series that is as large everywhere, and about
+/// one where nearly all of it lies in one stretch (Satterthwaite: (tr M)²/tr M², M the covariance of the cosines'
 /// projections). Blocks may be longer than those of the covariance, but more than the frequencies; else these are as
 /// many as can be told.
 [[nodiscard]] double effective_freedom(const Eigen::RowVectorXd& squares, std::size_t frequencies);

@@ -96,8 +96,8 @@ struct ExtrapolatedBound {
 ///
 ///     max over rows of |y − Yθ̂| + √(p·F_{p,ν}(1 − risk) · Y Σ Yᵀ)
 ///
-/// with Σ the covariance of θ̂ and ν its degrees of freedom (Scheffé: all rows at once), in each row whichever says more
-/// of `summary`'s two: what residuals say where the parameters are seen, which is little of one that is seen once
+/// with Σ the covariance of θ̂ and ν its degrees of freedom (Scheffé: all rows at once), in each row whichever says
+/// more of `summary`'s two: what residuals say where the parameters are seen, which is little of one that is seen once
 /// (OutputResidual::fit_freedom), and what they say everywhere. Nothing is extrapolated: the rows are those that were
 /// seen. One walk over `rows`.
 [[nodiscard]] Eigen::VectorXd largest_plausible_error(core::RegressionSource& rows, const Eigen::VectorXd& theta,
