@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Preparation of a gap analysis: the drive, the nominal θ, the noise floor from the behaviour of the sensors alone,
-/// the effects of the healthy robot.
+/// Preparation of a gap analysis: the drive, the nominal θ, the noise floor, the effects of the healthy robot.
 #pragma once
 
 #include <optional>
@@ -18,33 +17,6 @@
 #include <wheelwright/gap/gap_rows.hpp>
 
 namespace wheelwright::gap {
-
-/// Standard deviations of the raw signals' noise, one per joint.
-struct SignalNoise {
-  Eigen::VectorXd effort;  ///< unit of the effort
-  Eigen::VectorXd speed;   ///< rad/s
-  bool counted = false;    ///< speeds are differences of encoder counts: their errors cancel from sample to sample
-};
-
-/// Third differences of the signals, of which a smooth motion leaves nothing; robust against jumps (the median of
-/// Gaussian noise: uniform noise comes out 5 % too large). Held efforts are taken as they are held. Counted speeds have
-/// the error of a uniformly rounded angle, count·h/√12, at both ends of the interval.
-[[nodiscard]] SignalNoise signal_noise(const Drive& drive);
-
-/// The floor that `noise` makes through f₂ at `beta`: of the efforts directly, and of the motion through the base
-/// model's θ (drive.theta); of the pose as pose_noise() has it, with a half of a count of each wheel at both ends of a
-/// window. Errors of joints and samples are taken as independent. What the sampling step itself leaves is in it:
-/// signals are taken as linear between instants, which only matters where there is next to no noise.
-[[nodiscard]] NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta);
-
-/// By which share the noise of the motion lowers least-squares estimates of inertia: variance of the noise in the
-/// filtered accelerations over that of the filtered accelerations, the largest of all coordinates.
-[[nodiscard]] double attenuation(const Drive& drive, const SignalNoise& noise, double beta);
-
-/// The largest of 20, 14, 10, 7, 5, 3 and 2 1/s, not above `wish`, at which attenuation stays below `tolerated`; 2
-/// where none does.
-[[nodiscard]] double choose_gap_beta(const Drive& drive, const SignalNoise& noise, double wish,
-                                     double tolerated = 1e-3);
 
 /// A log ready for the search.
 struct PreparedGap {

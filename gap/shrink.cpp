@@ -14,6 +14,7 @@
 #include <wheelwright/gap/block_gram.hpp>
 #include <wheelwright/gap/gap_rows.hpp>
 #include <wheelwright/gap/improved_robot.hpp>
+#include <wheelwright/gap/noise_floor.hpp>
 #include <wheelwright/gap/prepared.hpp>
 #include <wheelwright/identify/noise_level.hpp>
 #include <wheelwright/sim/plant.hpp>

@@ -18,86 +18,16 @@
 #include <wheelwright/robots/robot_file.hpp>
 
 namespace wheelwright::results {
-namespace {
 
-using Status = commission::KinematicCommissioning::Status;
+using files::word_of;
 
-constexpr files::Words<Status, 4> kKinematicStatusWords{
-    {{Status::done, "done"}, {Status::partial, "partial"}, {Status::absent, "absent"}, {Status::nothing, "nothing"}}};
-
-Json box_json(const Box& box) {
-  Json sides = Json::array();
+Json sides_json(const Box& box) {
+  Json json = Json::array();
   for (const Interval& side : box.sides) {
-    sides.push_back({side.lower, side.upper});
+    json.push_back({side.lower, side.upper});
   }
-  return sides;
+  return json;
 }
-
-Json measurement_json(const filter::OdometryMeasurement& m) {
-  return {{"motion", files::word_of(robots::kMotionWords, m.motion)},
-          {"motion_columns", m.motion_columns},
-          {"position", m.position},
-          {"heading", m.heading},
-          {"gyro", m.gyro},
-          {"held_pose", m.held_pose},
-          {"count", m.count},
-          {"nominal_step", m.nominal_step}};
-}
-
-Json noise_json(const commission::KinematicCommissioning& r, const filter::OdometryMeasurement& m) {
-  const auto outputs = m.outputs(), units = m.output_units();
-  Json list = Json::array();
-  for (std::size_t i = 0; i < r.noise.size(); ++i) {
-    const commission::OutputNoise& n = r.noise[i];
-    list.push_back({{"output", outputs[i]},
-                    {"unit", units[i]},
-                    {"origin", files::word_of(robots::kNoiseOriginWords, n.origin)},
-                    {"bound", n.bound},
-                    {"learning", n.learning},
-                    {"warrant", core::warrant_word(n.warrant)}});
-  }
-  return {{"outputs", list}, {"declared_too_small", r.declared_too_small}, {"raise", r.raise}};
-}
-
-Json parameters_json(const commission::KinematicCommissioning& r) {
-  Json list = Json::array();
-  for (const commission::KinematicParameter& p : r.parameters) {
-    list.push_back({{"name", p.name},
-                    {"unit", p.unit},
-                    {"estimate", files::or_null(p.estimate)},
-                    {"lower", p.lower},
-                    {"upper", p.upper},
-                    {"warrant", core::warrant_word(p.warrant)},
-                    {"standard_error", files::or_null(p.standard_error)},
-                    {"nominal", p.nominal},
-                    {"excitation", files::word_of(kExcitationWords, p.excitation)},
-                    {"reason", p.reason}});
-  }
-  return list;
-}
-
-Json validation_json(const commission::KinematicCommissioning& r, const filter::OdometryMeasurement& m,
-                     const commission::FoldOptions& folds, double window) {
-  const auto names = m.outputs();
-  Json outputs = Json::array();
-  for (std::size_t i = 0; i < r.validation.size(); ++i) {
-    const commission::OutputValidation& v = r.validation[i];
-    outputs.push_back({{"output", names[i]},
-                       {"instants", v.instants},
-                       {"coverage", v.coverage},
-                       {"false_alarms", v.outside},
-                       {"utilisation", v.utilisation},
-                       {"rms", v.torque_rms},
-                       {"residual_rms", v.residual_rms},
-                       {"median_width", v.median_width},
-                       {"median_width_box", v.median_width_box}});
-  }
-  return {{"blocks", folds.blocks}, {"held_out_every", folds.hold_out_every}, {"purge", window}, {"outputs", outputs}};
-}
-
-}  // namespace
-
-namespace {
 
 Json error_class_json(const filter::ErrorClass& c) {
   Json json = {{"bound", c.bound}, {"bias", c.bias}, {"correlation", c.correlation}};
@@ -106,73 +36,6 @@ Json error_class_json(const filter::ErrorClass& c) {
   }
   return json;
 }
-
-// Facets and hull of a set.
-Json half_spaces_json(const std::vector<bounds::HalfSpace>& facets, const Box& hull) {
-  Json a = Json::array(), b = Json::array();
-  for (const bounds::HalfSpace& facet : facets) {
-    a.push_back(numbers(facet.a));
-    b.push_back(facet.b);
-  }
-  return {{"A", std::move(a)}, {"b", std::move(b)}, {"hull", box_json(hull)}};
-}
-
-Json pose_risk_json(const detector::PoseRiskModel& risk) {
-  const auto table = [](const Eigen::MatrixXd& values) {
-    Json rows = Json::array();
-    for (Eigen::Index w = 0; w < values.rows(); ++w) {
-      rows.push_back(numbers(values.row(w)));
-    }
-    return rows;
-  };
-  return {{"risk", risk.risk},
-          {"warrant", core::warrant_word(risk.warrant)},
-          {"errors",
-           {{"position", error_class_json(risk.errors.position)},
-            {"heading", error_class_json(risk.errors.heading)},
-            {"shortest_step", risk.errors.shortest_step}}},
-          {"feasible_set", half_spaces_json(risk.facets, risk.box)},
-          {"scales", risk.scales},
-          {"delay", risk.delay},
-          {"usual", {{"position", table(risk.usual_position)}, {"heading", table(risk.usual_heading)}}}};
-}
-
-}  // namespace
-
-std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, const commission::FoldOptions& folds) {
-  if (r.status == Status::absent) {
-    return std::nullopt;
-  }
-  Json json = {{"status", files::word_of(kKinematicStatusWords, r.status)}, {"message", r.message}};
-  if (!r.model) {
-    return json;
-  }
-  const detector::KinematicModel& m = *r.model;
-  json["warrant"] = core::warrant_word(m.warrant);
-  json["window"] = m.window;
-  json["outputs"] = m.measurement.outputs();
-  json["measurement"] = measurement_json(m.measurement);
-  json["noise"] = noise_json(r, m.measurement);
-  json["parameters"] = parameters_json(r);
-  json["feasible_set"] = {{"rows", r.rows}, {"prior", box_json(r.prior)}};
-  json["feasible_set"].update(half_spaces_json(m.facets, m.box));
-  json["detector"] = {{"estimate", numbers(m.estimate)},
-                      {"error_bounds",
-                       {{"motion", m.errors.motion},
-                        {"position", m.errors.position},
-                        {"heading", m.errors.heading},
-                        {"acceleration", m.errors.acceleration},
-                        {"yaw_gain", m.errors.yaw_gain},
-                        {"estimated", numbers(m.errors.estimated)}}},
-                      {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
-  json["validation"] = validation_json(r, m.measurement, folds, m.window);
-  if (m.at_risk) {
-    json["at_risk"] = pose_risk_json(*m.at_risk);
-  }
-  return json;
-}
-
-using files::word_of;
 
 Json assumptions_json(const std::vector<core::Assumption>& assumptions) {
   Json list = Json::array();
@@ -402,14 +265,6 @@ Json set_json(const Commissioning& r, const Model& model) {
       }
       json["blocks"].push_back({{"parameters", block.parameters}, {"vertices", vertices}});
     }
-  }
-  return json;
-}
-
-Json sides_json(const Box& box) {
-  Json json = Json::array();
-  for (const Interval& side : box.sides) {
-    json.push_back({side.lower, side.upper});
   }
   return json;
 }

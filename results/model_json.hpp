@@ -33,6 +33,12 @@ inline constexpr files::Words<bounds::Side, 2> kSideWords{
 /// The list as results have it under `assumptions`.
 [[nodiscard]] Json assumptions_json(const std::vector<core::Assumption>& assumptions);
 
+/// Lower and upper end of each side.
+[[nodiscard]] Json sides_json(const Box& box);
+
+/// What is known of one column's errors, without a deviation that is no less than the bound.
+[[nodiscard]] Json error_class_json(const filter::ErrorClass& c);
+
 /// Error classes as model.json has them under `at_risk/errors`.
 [[nodiscard]] Json error_classes_json(const filter::ErrorClasses& classes);
 

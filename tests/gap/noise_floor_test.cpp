@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: what noise does to the rows of the very same motion, simulated with and without it.
-#include <wheelwright/gap/prepared.hpp>
+#include <wheelwright/gap/noise_floor.hpp>
 
 #include <algorithm>
 #include <cmath>
