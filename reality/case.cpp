@@ -169,8 +169,8 @@ std::vector<Subject> subjects(std::string_view effect) {
 
 namespace {
 
-/// No severity makes a gap that stands out of the noise.
-class TooSmall : public Error {
+/// No severity makes a gap that stands out of the noise, or the one that does is more than the robot stands on some drive.
+class Unfit : public Error {
  public:
   using Error::Error;
 };
@@ -205,7 +205,7 @@ Case draw_case(const Request& request, std::uint64_t item, const Subject* fixed)
   std::vector<std::uint64_t> streams;
   for (std::uint64_t attempt = 0; result.causes.size() < wanted; ++attempt) {
     if (attempt == (fixed != nullptr ? 4U : 40U)) {
-      throw TooSmall(fmt::format("reality: no effect is large enough in case {}", item));
+      throw Unfit(fmt::format("reality: no effect is large enough in case {}", item));
     }
     Subject subject;
     if (fixed != nullptr) {
@@ -242,7 +242,11 @@ Case draw_case(const Request& request, std::uint64_t item, const Subject* fixed)
     for (std::size_t k = 0; k < wanted; ++k) {
       effects.push_back(source.make(result.causes[k].of, streams[k], result.causes[k].severity));
     }
-    return run_world(robot, effects, drive);
+    try {
+      return run_world(robot, effects, drive);
+    } catch (const Error& error) {
+      throw Unfit(error.what());
+    }
   };
   const Record real = run(real_drive);
   const Record fresh = run(drive_of(of_fresh));
@@ -266,16 +270,13 @@ Case draw_case(const Request& request, std::uint64_t item, const Subject* fixed)
 }  // namespace
 
 Case make_case(const Request& request, std::uint64_t index) {
-  if (!request.each) {
-    return draw_case(request, index, nullptr);
-  }
-  const std::vector<Subject> all = subjects(request.effect);
+  const std::vector<Subject> all = request.each ? subjects(request.effect) : std::vector<Subject>();
   // Some robots cannot show some effects: a light rotor its play. Another robot is drawn then.
   constexpr std::uint64_t robots = 8;
   for (std::uint64_t k = 0;; ++k) {
     try {
-      return draw_case(request, index + (k << 32), &all[index % all.size()]);
-    } catch (const TooSmall&) {
+      return draw_case(request, index + (k << 32), request.each ? &all[index % all.size()] : nullptr);
+    } catch (const Unfit&) {
       if (k + 1 == robots) {
         throw;
       }
