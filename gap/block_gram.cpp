@@ -352,6 +352,12 @@ BlockGram::BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& op
                                       std::min(std::max<std::size_t>(2, options.fewest), blocks_), blocks_);
   }
   const double length = (end - begin) / static_cast<double>(blocks_);
+  for (std::size_t b = 0; b < blocks_; ++b) {
+    const double from = begin + static_cast<double>(b) * length;
+    interiors_.emplace_back(b == 0 ? begin : from + options.purge,
+                            b + 1 == blocks_ ? std::nextafter(end, 2.0 * std::abs(end) + 1.0)
+                                             : begin + (static_cast<double>(b) + 1.0) * length - options.purge);
+  }
   const std::size_t pairs = (columns_ + 1) * (columns_ + 2) / 2;
   gram_.assign(pairs * lanes(), 0.0);
   rows_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(blocks_));
@@ -465,6 +471,57 @@ Eigen::VectorXd BlockGram::held_out_loss(const Subset& subset) const {
   problem.solve_without_signs();
   problem.mend_signs(subset.sign);
   return problem.losses();
+}
+
+Eigen::MatrixXd BlockGram::held_out_coefficients(const Subset& subset) const {
+  Problem problem = gather(subset);
+  problem.solve_without_signs();
+  problem.mend_signs(subset.sign);
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Eigen::MatrixXd coefficients = Eigen::Map<const Rows>(problem.x.data(), static_cast<Eigen::Index>(problem.k),
+                                                        static_cast<Eigen::Index>(blocks_));
+  for (std::size_t i = 0; i < problem.k; ++i) {
+    coefficients.row(static_cast<Eigen::Index>(i)) *= problem.unit[i];
+  }
+  return coefficients;
+}
+
+Eigen::VectorXd held_out_pieces(const BlockGram& gram, const std::vector<RowSpace>& spaces, const Subset& subset,
+                                double length) {
+  check::positive(length, "held_out_pieces length");
+  const Eigen::MatrixXd coefficients = gram.held_out_coefficients(subset);
+  std::vector<double> losses;
+  for (std::size_t block = 0; block < gram.blocks(); ++block) {
+    if (!(gram.rows()[static_cast<Eigen::Index>(block)] > 0.0)) {
+      continue;
+    }
+    const auto [from, to] = gram.interiors()[block];
+    const auto pieces = std::max<Eigen::Index>(1, static_cast<Eigen::Index>((to - from) / length));
+    const std::size_t first_piece = losses.size();
+    losses.resize(first_piece + static_cast<std::size_t>(pieces), 0.0);
+    for (const RowSpace& space : spaces) {
+      const Eigen::Index first = first_at(space.t, from),
+                         count = std::max<Eigen::Index>(first_at(space.t, to) - first, 0);
+      Eigen::VectorXd left = space.response.segment(first, count);
+      for (const std::size_t fixed : subset.fixed) {
+        if (space.columns[fixed].size() > 0) {
+          left -= space.columns[fixed].segment(first, count);
+        }
+      }
+      for (std::size_t i = 0; i < subset.columns.size(); ++i) {
+        if (const Eigen::VectorXd& column = space.columns[subset.columns[i]]; column.size() > 0) {
+          left -= coefficients(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(block)) *
+                  column.segment(first, count);
+        }
+      }
+      for (Eigen::Index k = 0; k < count; ++k) {
+        const double place = (space.t[first + k] - from) / (to - from) * static_cast<double>(pieces);
+        const auto piece = std::min(static_cast<Eigen::Index>(place), pieces - 1);
+        losses[first_piece + static_cast<std::size_t>(piece)] += std::pow(left[k] / space.floor, 2);
+      }
+    }
+  }
+  return Eigen::Map<const Eigen::VectorXd>(losses.data(), static_cast<Eigen::Index>(losses.size()));
 }
 
 double BlockGram::held_out_error(const Subset& subset) const { return held_out_loss(subset).sum() / rows_.sum(); }

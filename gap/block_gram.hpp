@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -100,6 +101,12 @@ class BlockGram {
   /// Its sums over each block, for paired comparisons.
   [[nodiscard]] Eigen::VectorXd held_out_loss(const Subset& subset) const;
 
+  /// Coefficients (one row for each column of the subset) that each block (one column each) is predicted with.
+  [[nodiscard]] Eigen::MatrixXd held_out_coefficients(const Subset& subset) const;
+
+  /// First time of the inner rows of each block, and the one that they end before, s.
+  [[nodiscard]] const std::vector<std::pair<double, double>>& interiors() const { return interiors_; }
+
   /// Fit to all rows. The covariance is the sandwich of the blocks' scores s_b, each freed of its block's leverage,
   /// (B−1)/B Σ d_b d_bᵀ with d_b = (XᵀX + Λ − X_bᵀX_b)⁻¹ s_b, which is the jackknife over blocks (Bell and McCaffrey
   /// 2002), plus what the prior of precision Λ leaves, H⁻¹ΛH⁻¹ with H = XᵀX + Λ. It holds for residuals that are
@@ -125,8 +132,15 @@ class BlockGram {
   std::size_t blocks_ = 0;
   std::vector<double> gram_;
   Eigen::VectorXd rows_;
+  std::vector<std::pair<double, double>> interiors_;
   double all_rows_ = 0.0;
 };
+
+/// Held-out losses as BlockGram::held_out_loss has them, of equal parts of the inner time of each block with rows, no
+/// shorter than `length` (s, > 0): neighbours of one block share their coefficients, not their rows. `spaces` are those
+/// of `gram`.
+[[nodiscard]] Eigen::VectorXd held_out_pieces(const BlockGram& gram, const std::vector<RowSpace>& spaces,
+                                              const Subset& subset, double length);
 
 /// Schur complement of the Gram matrix: Σ rᵢ rⱼ over all rows, r the columns `of` less their least-squares fit by the
 /// columns `on` (indices of `gram`, the response has the index columns()). Columns of `on` that depend linearly on the

@@ -29,14 +29,15 @@ struct Candidate {
               ///< all
 };
 
-/// All candidates of a gap analysis. Keeps a reference to the Gram matrices.
+/// All candidates of a gap analysis. Keeps references to the Gram matrices and their rows.
 struct CandidateTable {
   const BlockGram* gram = nullptr;
-  std::vector<std::size_t> base;      ///< columns of the base model's parameters θ
-  std::vector<std::size_t> unknown;   ///< those of them that have no nominal value: fitted in any case
-  std::vector<Candidate> candidates;  ///< of one effect side by side
-  std::vector<std::string> names;     ///< of the effects, by index
-  std::vector<bool> free_form{};      ///< of the effects, by index (Effect::free_form); empty: none
+  const std::vector<RowSpace>* spaces = nullptr;  ///< of `gram`; nothing: gains are compared over whole blocks
+  std::vector<std::size_t> base;                  ///< columns of the base model's parameters θ
+  std::vector<std::size_t> unknown;               ///< those of them that have no nominal value: fitted in any case
+  std::vector<Candidate> candidates;              ///< of one effect side by side
+  std::vector<std::string> names;                 ///< of the effects, by index
+  std::vector<bool> free_form{};                  ///< of the effects, by index (Effect::free_form); empty: none
   std::vector<std::pair<std::size_t, double>>
       inertias{};  ///< columns of θ that are inertias, with the nominal values that their coefficients add to
 };

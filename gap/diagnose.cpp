@@ -340,18 +340,23 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   {
     const BlockGram gram(problem.rows.spaces, blocks);
     problem.table.gram = &gram;
+    problem.table.spaces = &problem.rows.spaces;
     const Selection first = select_causes(problem.table, problem.kinds, trusted, 1.0, selection);
     ShapeGrids finer = finer_shapes(prepared.catalogue, coarse, problem.table, first.looked_at);
     TuneOptions tune;
     tune.seed = options.seed;
     tune.threads = options.threads;
     add_tuned_shapes(finer, prepared, problem, first.looked_at, tune);
+    if (trusted) {
+      add_shapes_with_theta_held(finer, prepared, problem, first.structural);
+    }
     expect_efforts(prepared, problem, first.structural);
     problem = problem_with(finer);
   }
   tell("comparing combinations", 0.4);
   const BlockGram gram(problem.rows.spaces, blocks);
   problem.table.gram = &gram;
+  problem.table.spaces = &problem.rows.spaces;
   const Selection found = select_causes(problem.table, problem.kinds, trusted, 1.0, selection);
 
   Diagnosis result;
@@ -364,7 +369,7 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   result.floor_error =
       prepared.reference == GapReference::healthy_log ? 0.0 : std::sqrt(1.0 + options.sensor_floor) - 1.0;
   result.notes = prepared.notes;
-  if (!found.enough_blocks) {
+  if (!found.enough_time) {
     result.notes.push_back(
         "the log is too short for any cause to stand out from chance: drive longer, or look for fewer effects");
   }

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <span>
+#include <string>
 #include <utility>
 
 #include <wheelwright/core/linear_algebra.hpp>
@@ -220,27 +222,29 @@ std::vector<GapEstimate> numbers_of(const Effect& effect, const Eigen::VectorXd&
   return numbers;
 }
 
+Eigen::VectorXd fitted_shape(const CausesModel& model) {
+  identify::VariableProjectionOptions options;
+  options.start = model.start();
+  if (options.start.size() == 0) {
+    return options.start;
+  }
+  options.lower.resize(model.shapes());
+  options.upper.resize(model.shapes());
+  for (std::size_t k = 0; k < model.free().size(); ++k) {
+    options.lower[static_cast<Eigen::Index>(k)] = model.free()[k].lower;
+    options.upper[static_cast<Eigen::Index>(k)] = model.free()[k].upper;
+  }
+  options.most_iterations = 20;
+  const identify::SeparableFit fit = identify::variable_projection(model, options);
+  return fit.end == identify::SearchEnd::failed ? options.start : fit.shape;
+}
+
 }  // namespace
 
 FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, const CauseSet& set, BaseModel base,
                         const BlockOptions& blocks) {
   const CausesModel model(prepared, problem, set, base);
-  Eigen::VectorXd shape = model.start();
-  if (shape.size() > 0) {
-    identify::VariableProjectionOptions options;
-    options.start = shape;
-    options.lower.resize(shape.size());
-    options.upper.resize(shape.size());
-    for (std::size_t k = 0; k < model.free().size(); ++k) {
-      options.lower[static_cast<Eigen::Index>(k)] = model.free()[k].lower;
-      options.upper[static_cast<Eigen::Index>(k)] = model.free()[k].upper;
-    }
-    options.most_iterations = 20;
-    const identify::SeparableFit fit = identify::variable_projection(model, options);
-    if (fit.end != identify::SearchEnd::failed) {
-      shape = fit.shape;
-    }
-  }
+  const Eigen::VectorXd shape = fitted_shape(model);
 
   // The model linearised at `shape`: θ, the causes' columns, and the derivatives by the shapes.
   std::vector<RowSpace> spaces;
@@ -468,6 +472,34 @@ void add_tuned_shapes(ShapeGrids& grids, const PreparedGap& prepared, const GapP
     for (std::size_t k = 0; k < model.members().size(); ++k) {
       if (!prepared.catalogue[model.members()[k].effect].shapes.empty()) {
         grids[model.members()[k].effect].push_back(model.shape_of(k, shape));
+      }
+    }
+  }
+}
+
+void add_shapes_with_theta_held(ShapeGrids& grids, const PreparedGap& prepared, const GapProblem& problem,
+                                const CauseSet& set) {
+  const CandidateTable& table = problem.table;
+  for (std::size_t k = 0; k < set.members.size(); ++k) {
+    const std::string& name = table.names[table.candidates[set.members[k]].effect];
+    for (std::size_t e = 0; e < table.names.size(); ++e) {
+      if (table.names[e] != name || continuous_shapes(prepared.catalogue[e]) == 0) {
+        continue;
+      }
+      std::optional<CauseSet> best;
+      for (std::size_t c = 0; c < table.candidates.size(); ++c) {
+        if (table.candidates[c].effect == e) {
+          std::vector<std::size_t> members = set.members;
+          members[k] = c;
+          CauseSet with = evaluate(table, std::move(members), BaseModel::nominal);
+          if (!best || with.held_out_error < best->held_out_error) {
+            best = std::move(with);
+          }
+        }
+      }
+      if (best) {
+        const CausesModel model(prepared, problem, *best, BaseModel::nominal);
+        grids[e].push_back(model.shape_of(k, fitted_shape(model)));
       }
     }
   }

@@ -28,10 +28,14 @@ Signal integral(const Drive& drive, const Signal& signal) {
   return sum;
 }
 
+// From one end of each window to the other.
 Signal differences(const Windows& windows, const Signal& signal) {
+  const auto mean_about = [&](Eigen::Index row) {
+    return signal.segment(row - windows.reach, 2 * windows.reach + 1).mean();
+  };
   Signal result(static_cast<Eigen::Index>(windows.size()));
   for (std::size_t k = 0; k < windows.size(); ++k) {
-    result[static_cast<Eigen::Index>(k)] = signal[windows.last[k]] - signal[windows.first[k]];
+    result[static_cast<Eigen::Index>(k)] = mean_about(windows.last[k]) - mean_about(windows.first[k]);
   }
   return result;
 }
@@ -51,10 +55,16 @@ void turn(const Drive& drive, const Windows& windows, const Signal& x, const Sig
 
 bool sees_yaw(const Drive& drive) { return drive.two_wheels() && (drive.has_heading() || drive.gyro.size() > 0); }
 
-// Standard deviation of white noise on a smooth signal: median of |third differences|, whose variance is 20 σ².
-double noise_of(const Drive& drive, const Signal& signal) {
+// Standard deviations of white noise on a smooth signal, and of what its resolution makes.
+struct WhiteNoise {
+  double deviation = 0.0;
+  double resolution = 0.0;
+};
+
+// By the median of |third differences|, whose variance is 20 σ², and the smallest step that occurs.
+WhiteNoise noise_of(const Drive& drive, const Signal& signal) {
   std::vector<double> size;
-  double resolution = 0.0;  // smallest step that occurs
+  double resolution = 0.0;
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
     const auto [first, last] = drive.segment(s);
     for (Eigen::Index k = first + 3; k < last; ++k) {
@@ -66,9 +76,9 @@ double noise_of(const Drive& drive, const Signal& signal) {
     }
   }
   if (size.empty()) {
-    return 0.0;
+    return {};
   }
-  return std::max(core::median(std::move(size)) / (0.6744897501960817 * std::sqrt(20.0)), resolution / std::sqrt(12.0));
+  return {core::median(std::move(size)) / (0.6744897501960817 * std::sqrt(20.0)), resolution / std::sqrt(12.0)};
 }
 
 double rms_of(const Signal& signal) {
@@ -81,10 +91,11 @@ Windows make_windows(const Drive& drive, double length) {
   check::positive(length, "window");
   const auto steps = std::max<Eigen::Index>(2, std::lround(length / drive.step));
   Windows windows;
+  windows.reach = steps / 4;
   std::vector<double> t;
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
     const auto [first, last] = drive.segment(s);
-    for (Eigen::Index k = first; k + steps < last; k += steps) {
+    for (Eigen::Index k = first + windows.reach; k + steps + windows.reach < last; k += steps) {
       windows.first.push_back(k);
       windows.middle.push_back(k + steps / 2);
       windows.last.push_back(k + steps);
@@ -133,15 +144,19 @@ Increments increments_of(const Drive& drive, const Windows& windows, const Colum
   return increments;
 }
 
-IncrementNoise pose_noise(const Drive& drive) {
+IncrementNoise pose_noise(const Drive& drive, Eigen::Index reach) {
   IncrementNoise noise;
   const double of_two = std::sqrt(2.0);
+  const auto of_mean = [&](const Signal& signal) {
+    const WhiteNoise white = noise_of(drive, signal);
+    return std::max(white.deviation / std::sqrt(static_cast<double>(2 * reach + 1)), white.resolution);
+  };
   if (drive.has_pose()) {
-    const double position = std::hypot(noise_of(drive, drive.x), noise_of(drive, drive.y)) / of_two;
+    const double position = std::hypot(of_mean(drive.x), of_mean(drive.y)) / of_two;
     noise.forward = noise.lateral = of_two * position;
   }
   if (drive.has_heading()) {
-    noise.yaw = of_two * noise_of(drive, drive.heading);
+    noise.yaw = of_two * of_mean(drive.heading);
   }
   return noise;
 }

@@ -36,11 +36,13 @@ struct ResidualSeries {
   double floor = 0.0;        ///< standard deviation of the noise, unit of the values
 };
 
-/// Consecutive windows, none across segments.
+/// Consecutive windows, none across segments. What a signal has at their ends is its mean over `reach` rows on both
+/// sides, where errors of the pose average out.
 struct Windows {
   std::vector<Eigen::Index> first;   ///< rows at which windows begin
   std::vector<Eigen::Index> middle;  ///< rows whose heading is the direction of `forward`
   std::vector<Eigen::Index> last;    ///< rows at which they end, each the next one's first
+  Eigen::Index reach = 0;            ///< rows
   Eigen::VectorXd t;                 ///< time of their middles, s
 
   [[nodiscard]] std::size_t size() const { return first.size(); }
@@ -60,14 +62,16 @@ struct IncrementNoise {
   double yaw = 0.0;      ///< rad
 };
 
-/// Windows of `length` (s; at least two steps), the remainder of each segment left out. A segment without a whole
-/// window has none. Throws InvalidArgument unless `length` is > 0.
+/// Windows of `length` (s; at least two steps) with a reach of a quarter of it, the remainder of each segment left out.
+/// A segment without a whole window has none. Throws InvalidArgument unless `length` is > 0.
 [[nodiscard]] Windows make_windows(const Drive& drive, double length = 0.5);
 
 /// Pose minus odometry over each window: with the measured p and θ and the wheels' smooth v1 and v2,
 ///
 ///     [forward, lateral] = R(−θ_middle) (p_last − p_first − ∫ v1 [cos θ, sin θ] dt)
 ///     yaw                = θ_last − θ_first − ∫ v2 dt
+///
+/// where the ends of what is integrated are means too (Windows::reach).
 ///
 /// Only yaw for a log with a heading but no position, or with a gyro only (whose ∫ gyro dt stands for the heading);
 /// nothing for a log with neither, or a robot without two wheels.
@@ -78,8 +82,9 @@ struct IncrementNoise {
 [[nodiscard]] Increments increments_of(const Drive& drive, const Windows& windows, const Column& column);
 
 /// Noise of the increments from that of the pose, by third differences of the pose (a smooth motion leaves none of
-/// itself), never below what the pose's resolution makes. Errors of the wheels are not in it.
-[[nodiscard]] IncrementNoise pose_noise(const Drive& drive);
+/// itself), which averages out over the windows' `reach`; never below what the pose's resolution makes. Errors of the
+/// wheels are not in it.
+[[nodiscard]] IncrementNoise pose_noise(const Drive& drive, Eigen::Index reach = 0);
 
 /// Part of `gap` that the wheels' motion does not determine: half the mean square difference between windows of nearly
 /// the same motion (both coordinates at first, middle and last row, each within a twentieth of its root mean square in
@@ -104,7 +109,8 @@ struct NoiseFloor {
 /// Options for the rows of a drive.
 struct GapRowOptions {
   double beta = 10.0;       ///< of f₂, 1/s
-  double row_step = 0.4;    ///< in 1/β: rows of efforts are taken this far apart; those between say nothing new
+  double row_step = 1.0;    ///< in 1/β: rows of efforts are taken this far apart; those between say little new, and
+                            ///< would count for more than the pose's
   double window = 0.5;      ///< s, of pose increments
   bool skip_rest = true;    ///< leave out rows near a joint's standstill
   std::size_t threads = 1;  ///< results do not depend on it

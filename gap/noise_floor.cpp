@@ -133,7 +133,7 @@ SignalNoise signal_noise(const Drive& drive) {
   return noise;
 }
 
-NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta) {
+NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta, double window) {
   const Energies energy = energies(drive, beta, noise.counted);
   NoiseFloor floor;
   const auto n = static_cast<Eigen::Index>(drive.model.n());
@@ -154,7 +154,7 @@ NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta
     }
   }
   floor.efforts = (variance + step_errors(drive, beta).cwiseAbs2()).cwiseSqrt();
-  floor.increments = pose_noise(drive);
+  floor.increments = pose_noise(drive, make_windows(drive, window).reach);
   if (drive.two_wheels()) {
     const IncrementNoise errors = step_errors(drive);
     add(floor.increments.forward, errors.forward);

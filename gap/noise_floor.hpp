@@ -23,10 +23,11 @@ struct SignalNoise {
 [[nodiscard]] SignalNoise signal_noise(const Drive& drive);
 
 /// The floor that `noise` makes through f₂ at `beta`: of the efforts directly, and of the motion through the base
-/// model's θ (drive.theta); of the pose as pose_noise() has it, with a half of a count of each wheel at both ends of a
-/// window. Errors of joints and samples are taken as independent. What the sampling step itself leaves is in it:
-/// signals are taken as linear between instants, which only matters where there is next to no noise.
-[[nodiscard]] NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta);
+/// model's θ (drive.theta); of the pose as pose_noise() has it over windows of `window` s, with a half of a count of
+/// each wheel at both of their ends. Errors of joints and samples are taken as independent. What the sampling step
+/// itself leaves is in it: signals are taken as linear between instants, which only matters where there is next to no
+/// noise.
+[[nodiscard]] NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta, double window = 0.5);
 
 /// By which share the noise of the motion lowers least-squares estimates of inertia: variance of the noise in the
 /// filtered accelerations over that of the filtered accelerations, the largest of all coordinates.

@@ -153,7 +153,8 @@ FittedEffect timing_of(const Drive& drive, const GapRows& rows, std::vector<Eige
 // What the sensors' noise makes of the rows of the log, and its origin in words.
 void floor_by_sensors(PreparedGap& prepared) {
   const Drive& drive = prepared.drive;
-  prepared.floor = without_efforts(noise_floor(drive, signal_noise(drive), prepared.row_options.beta), drive);
+  prepared.floor = without_efforts(
+      noise_floor(drive, signal_noise(drive), prepared.row_options.beta, prepared.row_options.window), drive);
   prepared.floor_origin = "the noise of the sensors, found from the log's own differences";
   const Windows windows = make_windows(drive, prepared.row_options.window);
   const IncrementNoise repeated = repeatability(drive, windows, pose_gap(drive, windows));
@@ -182,7 +183,8 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   const bool simulated = prepared.reference == GapReference::simulator;
   prepared.theta = fit_base(drive, beta);
   predict_efforts(drive, prepared.theta);
-  NoiseFloor sensors = without_efforts(noise_floor(drive, signal_noise(drive), beta), drive);
+  NoiseFloor sensors =
+      without_efforts(noise_floor(drive, signal_noise(drive), beta, prepared.row_options.window), drive);
   if (simulated) {
     // What the simulator has below the noise of the robot's sensors is nothing to them.
     predict_efforts(prepared.drive, prepared.theta);
@@ -195,6 +197,7 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   blocks.threads = options.threads;
   const BlockGram gram(problem.rows.spaces, blocks);
   problem.table.gram = &gram;
+  problem.table.spaces = &problem.rows.spaces;
   SelectionOptions selection = options.selection;
   selection.threads = options.threads;
   const Selection found = select_causes(problem.table, problem.kinds, false, 1.0, selection);
@@ -294,7 +297,7 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
   }
   for (const Effect& effect : catalogue) {
     problem.table.free_form.push_back(effect.free_form);
-    EffectKind kind{effect.inexact, {}};
+    EffectKind kind{effect.inexact, {}, effect.parametric};
     for (std::size_t e = 0; e < catalogue.size(); ++e) {
       if (std::ranges::find(effect.stands_for, catalogue[e].name) != effect.stands_for.end()) {
         kind.stands_for.push_back(e);

@@ -21,9 +21,8 @@ namespace {
 // Probability that the logarithms of the savings add up to so much when their signs are left to chance: for an effect
 // that shows in half of the blocks only, but there by far. By random signs. Below the floor's own mean square savings
 // count by their size.
-double sign_flip_p(const CauseSet& worse, const CauseSet& better, std::uint64_t seed) {
+double sign_flip_p(const Eigen::ArrayXd& d, std::uint64_t seed) {
   constexpr int kFlips = 20000;
-  const Eigen::ArrayXd d = worse.loss - better.loss;
   const Eigen::ArrayXd size = d.abs().log1p();
   const double seen = (d.sign() * size).sum() * (1.0 - 1e-12);
   std::mt19937_64 generator(seed);
@@ -90,8 +89,9 @@ class Selector {
     }
     const std::vector<std::vector<CauseSet>> levels = search_causes(table_, search);
     const CauseSet& nothing = levels[0][0];
-    const auto used = static_cast<double>((table_.gram->rows().array() > 0.0).count());
-    result.enough_blocks = std::exp2(-used) < level_;
+    const auto compared = static_cast<double>(table_.spaces == nullptr ? (table_.gram->rows().array() > 0.0).count()
+                                                                       : losses(nothing).size());
+    result.enough_time = std::exp2(-compared) < level_;
     const CauseSet nominal = nominal_trusted ? evaluate(table_, {}, BaseModel::nominal) : nothing;
     result.refitted_excess = nothing.held_out_error - floor_;
     result.nominal_excess = nominal.held_out_error - floor_;
@@ -136,8 +136,7 @@ class Selector {
   // Whether `next` is worth its further causes. Nothing is where the floor is reached already.
   [[nodiscard]] bool gains(const CauseSet& now, const CauseSet& next, double whole) const {
     const double gain = now.held_out_error - next.held_out_error;
-    constexpr double kLeastGap =
-        0.1;  // less is nothing, though a cause may lower the noise of a log that has less of it
+    constexpr double kLeastGap = 0.1;  // less is nothing, though a cause may lower the noise of a log that has less
     const double left = excess(now);
     if (!(left > 0.0) || gap_ < kLeastGap) {
       return false;
@@ -146,8 +145,19 @@ class Selector {
     const bool large = gain > options_.large_share * whole;
     const bool last =
         gain > options_.large_part * left && gain > options_.tolerated_floor && gain > options_.small_share * whole;
-    return gain > options_.smallest && (counts || large || last) &&
-           (signed_rank(now.loss - next.loss) > critical_ || sign_flip_p(now, next, options_.seed) < level_);
+    if (!(gain > options_.smallest && (counts || large || last))) {
+      return false;
+    }
+    const Eigen::VectorXd savings = losses(now) - losses(next);
+    return signed_rank(savings) > critical_ || sign_flip_p(savings, options_.seed) < level_;
+  }
+
+  // What the set, θ fitted again, leaves of each stretch of time.
+  [[nodiscard]] Eigen::VectorXd losses(const CauseSet& set) const {
+    return table_.spaces == nullptr
+               ? set.loss
+               : held_out_pieces(*table_.gram, *table_.spaces, subset_of(table_, set.members, BaseModel::refitted),
+                                 options_.piece);
   }
 
   // The set without those of its members that it does as well without.
@@ -258,8 +268,14 @@ class Selector {
     return own > options_.cancellation * causes || own + theta > options_.theta_cancellation * all;
   }
 
+  [[nodiscard]] auto numbers_of_the_robot(const CauseSet& set) const {
+    return std::ranges::count_if(set.members,
+                                 [&](std::size_t c) { return kinds_[table_.candidates[c].effect].parametric; });
+  }
+
   // The set of a level to go on with: the best that is no absurdity, or one that it contains and that is as good with
-  // fewer coefficients.
+  // fewer coefficients. Of sets with the same columns the one with the fewest numbers of the robot that may be wrong:
+  // somebody has measured these.
   [[nodiscard]] const CauseSet* simplest(const std::vector<CauseSet>& level) const {
     const auto first = std::find_if(level.begin(), level.end(), [this](const CauseSet& set) { return !absurd(set); });
     if (first == level.end()) {
@@ -270,6 +286,14 @@ class Selector {
       if (set.coefficients < chosen->coefficients &&
           set.held_out_error <= level.front().held_out_error + margin(level.front()) && !absurd(set) &&
           unexplained_by(table_, set.members, level.front().members, BaseModel::refitted) < options_.contained) {
+        chosen = &set;
+      }
+    }
+    constexpr double kRounding = 1e-9;
+    for (const CauseSet& set : level) {
+      if (set.coefficients == chosen->coefficients &&
+          std::abs(set.held_out_error - chosen->held_out_error) <= kRounding * chosen->held_out_error &&
+          numbers_of_the_robot(set) < numbers_of_the_robot(*chosen) && !absurd(set)) {
         chosen = &set;
       }
     }

@@ -41,6 +41,8 @@ struct SelectionOptions {
   double small_share = 0.002;  ///< fraction of the gap, with `large_part`
   double smallest = 0.3;       ///< least gain of a cause in any case
   double significance = 0.05;  ///< of a gain, over all effects that were tried
+  double piece = 1.0;          ///< s, shortest stretch of time over which a gain is compared: errors that are further
+                               ///< apart are taken to be independent
   double misfit = 1.0;  ///< another set is as good if it is worse by at most this many times the best set's excess
   double level = 0.10;  ///< 1 − level is that of the confidence set
   double cancellation = 4.0;  ///< largest sum of squares of the causes' own signatures over that of their sum; above
@@ -76,7 +78,7 @@ struct Selection {
   bool theta_moved = false;              ///< θ differs from nominal and no parametric cause says why
   bool reaches_floor = true;             ///< what is left is tolerable, and not by any of many combinations
   bool any_cause = false;
-  bool enough_blocks = true;        ///< else no gain could have been significant over so few blocks of time
+  bool enough_time = true;          ///< else no gain could have been significant over so short a time
   std::vector<CauseSet> looked_at;  ///< every single effect and the best pairs and triples, θ fitted again
 };
 
@@ -84,6 +86,7 @@ struct Selection {
 struct EffectKind {
   double inexact = 0.0;                   ///< Effect::inexact
   std::vector<std::size_t> stands_for{};  ///< Effect::stands_for, by index
+  bool parametric = false;                ///< Effect::parametric
 };
 
 /// Selects. `floor_error` is the mean square that noise alone leaves (1 where the floors are right); `kinds` has one

@@ -114,6 +114,41 @@ TEST(BlockGram, HeldOutErrorIsThatOfQrOnTheRows) {
   }
 }
 
+TEST(HeldOutPieces, AreThoseOfQrOnTheRowsAndAddUpToTheBlocks) {
+  const std::vector<RowSpace> spaces = random_spaces(5);
+  const BlockGram gram(spaces, options());
+  const Subset subset{{0, 1, 2}, {4}, {}, {20.0, 0.0, 0.0}};
+  const Eigen::VectorXd blocks = gram.held_out_loss(subset);
+  // 5 s less 0.5 s at the ends within: four pieces of a second, or one that is no shorter than a block.
+  for (const auto& [length, each] : {std::pair{1.0, 4}, std::pair{7.0, 1}}) {
+    const Eigen::VectorXd pieces = held_out_pieces(gram, spaces, subset, length);
+    ASSERT_EQ(pieces.size(), static_cast<Eigen::Index>(kBlocks) * each);
+    for (std::size_t b = 0; b < kBlocks; ++b) {
+      const auto block = static_cast<Eigen::Index>(b);
+      EXPECT_NEAR(pieces.segment(each * block, each).sum(), blocks[block], 1e-9 * blocks[block]);
+    }
+  }
+  const Eigen::VectorXd pieces = held_out_pieces(gram, spaces, subset, 1.0);
+  const std::size_t b = 3;  // from 15 to 20 s; the second of its pieces from 16.5 to 17.5 s
+  const Eigen::VectorXd x =
+      solve(rows_of(spaces, subset, [](std::size_t block, bool inner) { return inner && block != b; }), subset);
+  double expected = 0.0;
+  for (const RowSpace& space : spaces) {
+    for (Eigen::Index k = 0; k < space.t.size(); ++k) {
+      if (space.t[k] >= 16.5 && space.t[k] < 17.5) {
+        double left = space.response[k] - space.columns[4][k];
+        for (std::size_t i = 0; i < subset.columns.size(); ++i) {
+          const Eigen::VectorXd& column = space.columns[subset.columns[i]];
+          left -= column.size() > 0 ? x[static_cast<Eigen::Index>(i)] * column[k] : 0.0;
+        }
+        expected += std::pow(left / space.floor, 2);
+      }
+    }
+  }
+  EXPECT_NEAR(pieces[4 * b + 1], expected, 1e-9 * expected);
+  EXPECT_THROW((void)held_out_pieces(gram, spaces, subset, 0.0), InvalidArgument);
+}
+
 TEST(BlockGram, FitIsThatOfQrOnAllRowsAndItsCovarianceTheJackknife) {
   const std::vector<RowSpace> spaces = random_spaces(2);
   const BlockGram gram(spaces, options());

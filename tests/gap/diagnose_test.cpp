@@ -190,7 +190,8 @@ TEST(TorqueOn, AFreshLogHoldsThePromise) {
 
 TEST(Diagnose, SaysThatALogIsTooShort) {
   Scenario s = noisy_scenario(robot_with("coulomb", {{"c", 0.3}}), 1);
-  const auto said = [&s](std::size_t blocks) {
+  const auto said = [&s](std::size_t blocks, double duration) {
+    s.duration = duration;
     DiagnoseOptions options = quick();
     options.blocks.blocks = blocks;
     const Diagnosis found = diagnosis_of(s, false, counted_robot(), options);
@@ -198,8 +199,9 @@ TEST(Diagnose, SaysThatALogIsTooShort) {
     return std::any_of(found.notes.begin(), found.notes.end(),
                        [](const std::string& note) { return note.find("drive longer") != std::string::npos; });
   };
-  EXPECT_TRUE(said(8));
-  EXPECT_FALSE(said(24));
+  EXPECT_TRUE(said(8, 13.0)) << "eight pieces of half a second";
+  EXPECT_FALSE(said(8, 40.0)) << "eight blocks of four pieces";
+  EXPECT_FALSE(said(24, 40.0));
 }
 
 }  // namespace

@@ -64,22 +64,43 @@ INSTANTIATE_TEST_SUITE_P(FitCauses, Intervals,
                                          Coverage{"actuator_lag", "T", 0.03, 0.1 / 50.0}),
                          [](const testing::TestParamInfo<Coverage>& given) { return given.param.effect; });
 
-// The shape lies between the points of the grid.
-TEST(FitCauses, FindsShapesBetweenTheGridsPoints) {
-  DiagnoseOptions options;
-  options.catalogue = only({"actuator_lag"});
-  const PreparedGap healthy = prepared_log(noisy_scenario(gap_example::counted_robot(), 1), false, options);
-  std::vector<double> grid;
-  for (const std::vector<double>& point : shape_grid(options.catalogue->front(), healthy.drive)) {
-    grid.push_back(point[0]);
+// A lag in the middle between two points of its grid.
+struct BetweenPoints {
+  double truth = 0.0, to_the_next = 0.0;
+  PreparedGap prepared;
+
+  explicit BetweenPoints(bool with_baseline) {
+    DiagnoseOptions options;
+    options.catalogue = only({"actuator_lag"});
+    const PreparedGap healthy = prepared_log(noisy_scenario(gap_example::counted_robot(), 1), false, options);
+    std::vector<double> grid;
+    for (const std::vector<double>& point : shape_grid(options.catalogue->front(), healthy.drive)) {
+      grid.push_back(point[0]);
+    }
+    const auto above = std::lower_bound(grid.begin(), grid.end(), 0.03);
+    truth = 0.5 * (*std::prev(above) + *above);
+    to_the_next = *above - truth;
+    prepared = prepared_log(noisy_scenario(robot_with("actuator_lag", {{"T", truth}}), 2), with_baseline, options);
   }
-  const auto above = std::lower_bound(grid.begin(), grid.end(), 0.03);
-  ASSERT_TRUE(above != grid.begin() && above != grid.end());
-  const double truth = 0.5 * (*std::prev(above) + *above);
-  const PreparedGap prepared =
-      prepared_log(noisy_scenario(robot_with("actuator_lag", {{"T", truth}}), 2), false, options);
-  const FittedCauses fitted = fitted_single(prepared);
-  EXPECT_NEAR(fitted.effects[0].shape[0], truth, 0.2 * (*above - truth));
+};
+
+TEST(FitCauses, FindsShapesBetweenTheGridsPoints) {
+  const BetweenPoints lag(false);
+  EXPECT_NEAR(fitted_single(lag.prepared).effects[0].shape[0], lag.truth, 0.2 * lag.to_the_next);
+}
+
+TEST(AddShapesWithThetaHeld, FindsThoseBetweenTheGridsPoints) {
+  const BetweenPoints lag(true);
+  const Problem problem(lag.prepared);
+  ShapeGrids grids = all_shapes(lag.prepared.catalogue, lag.prepared.drive);
+  const std::size_t before = grids.front().size();
+  add_shapes_with_theta_held(grids, lag.prepared, problem.problem, {});
+  EXPECT_EQ(grids.front().size(), before) << "of no causes";
+  const CauseSet found = problem.select().structural;
+  ASSERT_EQ(found.members.size(), 1U);
+  add_shapes_with_theta_held(grids, lag.prepared, problem.problem, found);
+  ASSERT_EQ(grids.front().size(), before + 1);
+  EXPECT_NEAR(grids.front().back()[0], lag.truth, 0.2 * lag.to_the_next);
 }
 
 TEST(FitCauses, GivesThetaBesideTheCausesOrHoldsIt) {

@@ -45,10 +45,11 @@ Drive circle(double share, double lateral, double noise = 0.0, int rows = 2000) 
 
 TEST(KinematicRows, WindowsDoNotCrossSegments) {
   const Windows windows = make_windows(circle(1.0, 0.0), 0.5);  // 100 steps
-  EXPECT_EQ(windows.size(), 10U + 9U);
+  EXPECT_EQ(windows.size(), 9U + 9U);
+  EXPECT_EQ(windows.reach, 25);
   for (std::size_t k = 0; k < windows.size(); ++k) {
     EXPECT_EQ(windows.last[k] - windows.first[k], 100);
-    EXPECT_EQ(windows.first[k] < 1010, windows.last[k] < 1010);
+    EXPECT_EQ(windows.first[k] - windows.reach < 1010, windows.last[k] + windows.reach < 1010);
   }
 }
 
@@ -56,8 +57,9 @@ TEST(KinematicRows, AMissingShareOfTheMotionIsTheChordThatIsMissing) {
   const Drive drive = circle(0.9, 0.03);
   const Windows windows = make_windows(drive, 0.5);
   const Increments gap = pose_gap(drive, windows);
-  // The integral of cos(ω s) from −W/2 to W/2, W = 0.5 s.
-  const double w = 0.9 * kW, chord = 2.0 * std::sin(0.25 * w) / w;
+  // The integral of cos(ω s) from −W/2 to W/2, W = 0.5 s, its ends the means of 51 rows: Dirichlet's kernel.
+  const double w = 0.9 * kW, mean = std::sin(25.5 * w * kStep) / (51.0 * std::sin(0.5 * w * kStep));
+  const double chord = 2.0 * std::sin(0.25 * w) / w * mean;
   for (Eigen::Index k = 0; k < gap.forward.size(); ++k) {
     EXPECT_NEAR(gap.forward[k], (0.9 * kV - kV) * chord, 1e-6);
     EXPECT_NEAR(gap.lateral[k], 0.03 * chord, 1e-6);
@@ -78,8 +80,11 @@ TEST(KinematicRows, NoiseOfThePoseIsFound) {
   const IncrementNoise noise = pose_noise(drive);
   EXPECT_NEAR(noise.forward, std::sqrt(2.0) * 0.004, 0.0006);
   EXPECT_NEAR(noise.yaw, std::sqrt(2.0) * 0.004, 0.0006);
-  const Eigen::VectorXd yaw = pose_gap(drive, make_windows(drive, 0.1)).yaw;
-  EXPECT_NEAR(std::sqrt(yaw.squaredNorm() / static_cast<double>(yaw.size())), noise.yaw, 0.25 * noise.yaw);
+  const Windows windows = make_windows(drive, 0.1);
+  const IncrementNoise averaged = pose_noise(drive, windows.reach);
+  EXPECT_DOUBLE_EQ(averaged.yaw, noise.yaw / std::sqrt(11.0));
+  const Eigen::VectorXd yaw = pose_gap(drive, windows).yaw;
+  EXPECT_NEAR(std::sqrt(yaw.squaredNorm() / static_cast<double>(yaw.size())), averaged.yaw, 0.25 * averaged.yaw);
 }
 
 TEST(KinematicRows, WithoutAPositionOnlyYawIsLeft) {
@@ -99,8 +104,9 @@ TEST(KinematicRows, RepeatedMotionShowsTheNoiseAndNotWhatIsMissing) {
   const Drive drive = circle(0.9, 0.03, noise, 40000);
   const Windows windows = make_windows(drive, 0.5);
   const IncrementNoise found = repeatability(drive, windows, pose_gap(drive, windows));
+  const double averaged = std::sqrt(2.0 / (2.0 * static_cast<double>(windows.reach) + 1.0)) * noise;
   for (const double value : {found.forward, found.lateral, found.yaw}) {
-    EXPECT_NEAR(value, std::sqrt(2.0) * noise, 0.15 * std::sqrt(2.0) * noise);
+    EXPECT_NEAR(value, averaged, 0.15 * averaged);
   }
   const IncrementNoise too_few = repeatability(drive, windows, pose_gap(drive, windows), windows.size() + 1);
   EXPECT_EQ(too_few.yaw, 0.0);

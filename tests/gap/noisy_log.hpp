@@ -73,7 +73,11 @@ struct Problem {
         gram(std::make_unique<BlockGram>(problem.rows.spaces, blocks)) {
     problem.table.gram = gram.get();
   }
-  [[nodiscard]] Selection select() const { return select_causes(problem.table, problem.kinds, true, 1.0); }
+  [[nodiscard]] Selection select() const {
+    CandidateTable table = problem.table;
+    table.spaces = &problem.rows.spaces;
+    return select_causes(table, problem.kinds, true, 1.0);
+  }
 };
 
 /// The effects called `names` out of the catalogue.

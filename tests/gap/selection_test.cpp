@@ -280,14 +280,33 @@ TEST(SelectCauses, SaysWhenNothingCouldBeSignificant) {
   const BlockGram few(table.spaces, {.blocks = 8});
   table.table.gram = &few;
   const Selection found = select_causes(table.table, table.kinds, false, 1.0);
-  EXPECT_EQ(found.enough_blocks, true) << "the signs of eight blocks have a chance of 1/256, three effects want 1/120";
+  EXPECT_EQ(found.enough_time, true) << "the signs of eight blocks have a chance of 1/256, three effects want 1/120";
   table.kinds.resize(30);
   for (std::size_t e = table.table.names.size(); e < 30; ++e) {
     table.table.names.push_back(fmt::format("effect {}", e));
   }
   const Selection many = select_causes(table.table, table.kinds, false, 1.0);
-  EXPECT_FALSE(many.enough_blocks);
+  EXPECT_FALSE(many.enough_time);
   EXPECT_FALSE(many.any_cause);
+  table.table.spaces = &table.spaces;
+  EXPECT_TRUE(select_causes(table.table, table.kinds, false, 1.0).enough_time) << "blocks of six pieces and more";
+}
+
+// Two blocks of 24 may both have gained by chance, 22 pieces of a second may not.
+TEST(SelectCauses, TakesACauseThatActsForAShortWhile) {
+  Table table(5.0, 1.0, 4800);
+  RowSpace& space = table.spaces[0];
+  for (Eigen::Index k = 0; k < space.t.size(); ++k) {
+    if (space.t[k] < 100.0 || space.t[k] > 125.0) {
+      space.response[k] -= 5.0 * space.columns[1][k];
+      space.columns[1][k] = 0.0;
+    }
+  }
+  const BlockGram gram(table.spaces);
+  table.table.gram = &gram;
+  EXPECT_FALSE(select_causes(table.table, table.kinds, false, 1.0).any_cause);
+  table.table.spaces = &table.spaces;
+  EXPECT_EQ(select_causes(table.table, table.kinds, false, 1.0).all.members, std::vector<std::size_t>{0});
 }
 
 TEST(SelectCauses, NeedsAGramAndAKindForEachEffect) {
