@@ -622,16 +622,20 @@ Eigen::MatrixXd remainder(const BlockGram& gram, const std::vector<std::size_t>&
 }
 
 double signed_rank(const Eigen::VectorXd& differences) {
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(differences.size()));
-  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  std::vector<Eigen::Index> order;
+  for (Eigen::Index k = 0; k < differences.size(); ++k) {
+    if (differences[k] != 0.0) {
+      order.push_back(k);
+    }
+  }
   std::stable_sort(order.begin(), order.end(),
                    [&](Eigen::Index a, Eigen::Index b) { return std::abs(differences[a]) < std::abs(differences[b]); });
   double positive = 0.0;
   for (std::size_t k = 0; k < order.size(); ++k) {
     positive += differences[order[k]] > 0.0 ? static_cast<double>(k + 1) : 0.0;
   }
-  const auto n = static_cast<double>(differences.size());
-  return (positive - n * (n + 1.0) / 4.0) / std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 24.0);
+  const auto n = static_cast<double>(order.size());
+  return order.empty() ? 0.0 : (positive - n * (n + 1.0) / 4.0) / std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 24.0);
 }
 
 }  // namespace wheelwright::gap

@@ -69,8 +69,8 @@ struct BlockFit {
 };
 
 /// Wilcoxon's signed-rank statistic of `differences` (of losses over blocks), in standard deviations: large where most
-/// are > 0. An effect may show in a few blocks only, by amounts that differ a thousandfold: the mean's t would be blind
-/// to it.
+/// are > 0; zeros do not count. An effect may show in a few blocks only, by amounts that differ a thousandfold: the
+/// mean's t would be blind to it.
 [[nodiscard]] double signed_rank(const Eigen::VectorXd& differences);
 
 /// Gram matrices of columns and response over the inner rows of each block, and over the rows near borders.

@@ -323,11 +323,12 @@ std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared, const std
   for (std::size_t p = 0; p < now.after_of.size(); ++p) {
     beyond.push_back(now.after_of[p] - usual * now.elsewhere_of[p]);
   }
+  const double added = now_alike.after - usual_alike * now_alike.elsewhere;
   found.play = now.ratio() > options.contrast * usual && now_alike.ratio() > options.contrast * usual_alike &&
+               added > options.outweighs * (now_alike.elsewhere - 1.0) &&
                median_above_zero_p(beyond) < options.significance;
   if (efforts > 0.0) {
-    found.effort_square =
-        std::max(now_alike.after - usual_alike * now_alike.elsewhere, 0.0) * now.presence * floor_square / efforts;
+    found.effort_square = std::max(added, 0.0) * now.presence * floor_square / efforts;
   }
   std::size_t more = 0, blocks = 0;
   for (Eigen::Index b = 0; b < fitted.counts.size(); ++b) {

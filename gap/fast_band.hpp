@@ -30,7 +30,8 @@ struct FastBandOptions {
   double row_step = 0.4;       ///< in 1/β
   double after = 0.15;         ///< s, how long after a reversal its play is crossed and the impact over
   double contrast = 1.25;      ///< least ratio of what is left after reversals and elsewhere over the healthy log's
-  double significance = 0.05;  ///< of it, over blocks of time
+  double outweighs = 2.0;      ///< least ratio of what reversals add to what is above the healthy log's elsewhere
+  double significance = 0.05;  ///< of the contrast, over blocks of time
   double above = 0.25;         ///< mean square above the healthy log's that counts as a gap of its own
   BlockOptions blocks{};
 };
@@ -42,7 +43,8 @@ struct FastBandOptions {
 /// Play is crossed after each reversal of the torque, within hundredths of a second: whatever the contact is like, the
 /// torque is missing first and then an impact. Below the band nothing of it is left. Rows just after a joint's speed
 /// has changed its sign, where friction acts, do not count. A torque reverses while it changes fast, when whatever is
-/// wrong with its delay or its limits shows too: it must also stand out against moments at which it changes as fast.
+/// wrong with its delay or its limits shows too: it must also stand out against moments at which it changes as fast, and
+/// outweigh what something else leaves at these.
 /// Nothing for a preparation without a healthy log, without efforts or with too few rows.
 [[nodiscard]] std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared,
                                                         const std::vector<FittedEffect>& causes,

@@ -61,7 +61,6 @@ class Selector {
     const std::set<std::string> tried_names(table.names.begin(), table.names.end());  // laws of one name are one try
     const auto tried = static_cast<double>(std::max<std::size_t>(tried_names.size(), 1));
     level_ = options.significance / (2.0 * tried);  // two tests of each
-    critical_ = core::normal_upper_quantile(level_);
     moves_theta_only_.assign(kinds.size(), true);
     does_nothing_.assign(kinds.size(), true);
     for (std::size_t c = 0; c < table.candidates.size(); ++c) {
@@ -91,7 +90,7 @@ class Selector {
     const CauseSet& nothing = levels[0][0];
     const auto compared = static_cast<double>(table_.spaces == nullptr ? (table_.gram->rows().array() > 0.0).count()
                                                                        : losses(nothing).size());
-    result.enough_time = std::exp2(-compared) < level_;
+    result.enough_time = enough_time_ = std::exp2(-compared) < level_;
     const CauseSet nominal = nominal_trusted ? evaluate(table_, {}, BaseModel::nominal) : nothing;
     result.refitted_excess = nothing.held_out_error - floor_;
     result.nominal_excess = nominal.held_out_error - floor_;
@@ -148,8 +147,11 @@ class Selector {
     if (!(gain > options_.smallest && (counts || large || last))) {
       return false;
     }
+    // Hardly any cause that is not there leaves next to nothing of what it was not fitted to.
+    const bool all = excess(next) <= std::max(options_.tolerated * left, options_.tolerated_floor);
+    const double level = all && enough_time_ ? options_.significance / 2.0 : level_;
     const Eigen::VectorXd savings = losses(now) - losses(next);
-    return signed_rank(savings) > critical_ || sign_flip_p(savings, options_.seed) < level_;
+    return signed_rank(savings) > core::normal_upper_quantile(level) || sign_flip_p(savings, options_.seed) < level;
   }
 
   // What the set, θ fitted again, leaves of each stretch of time.
@@ -447,6 +449,34 @@ class Selector {
     return std::nullopt;
   }
 
+  // The set without those of its members that explain nothing once the others are there: these reach the floor.
+  [[nodiscard]] CauseSet without_idle(CauseSet set) const {
+    for (std::size_t k = 0; k < set.members.size() && set.members.size() > 1;) {
+      CauseSet without = evaluate_without(table_, set, k, BaseModel::nominal);
+      if (excess(without) <= options_.tolerated_floor &&
+          without.held_out_error - set.held_out_error < options_.smallest) {
+        set = std::move(without);
+        k = 0;
+      } else {
+        ++k;
+      }
+    }
+    return set;
+  }
+
+  // Of the structural causes those that are among all.
+  void leave_out_idle(Selection& result) const {
+    std::vector<std::size_t> members = result.structural.members;
+    const auto idle = [&](std::size_t c) {
+      return std::ranges::none_of(result.all.members, [&](std::size_t other) {
+        return table_.candidates[other].effect == table_.candidates[c].effect;
+      });
+    };
+    if (std::erase_if(members, idle) > 0) {
+      result.structural = evaluate(table_, std::move(members), BaseModel::refitted);
+    }
+  }
+
   void add_parametric(Selection& result, const std::vector<CauseSet>& structural_rivals, bool nominal_trusted) const {
     std::vector<CauseSet> structural = structural_rivals;
     if (structural.empty()) {
@@ -458,6 +488,12 @@ class Selector {
       bool moves_theta = false;  // without saying why
     };
     std::vector<Rival> rivals;
+    const auto add = [&](const CauseSet& set, std::size_t i) {
+      CauseSet needed = without_idle(set);
+      if (std::ranges::none_of(rivals, [&](const Rival& r) { return r.set.members == needed.members; })) {
+        rivals.push_back({std::move(needed), i});
+      }
+    };
     for (std::size_t i = 0; i < structural.size(); ++i) {
       if (!nominal_trusted) {
         rivals.push_back({structural[i], i});
@@ -473,14 +509,14 @@ class Selector {
         continue;
       }
       const CauseSet& first = simplest_of(found);
-      rivals.push_back({first, i});
+      add(first, i);
       for (const CauseSet& set : found) {
         const bool close = set.held_out_error <= first.held_out_error + 3.0 * margin(first);
         const bool contains =
             first.coefficients < set.coefficients &&
             unexplained_by(table_, first.members, set.members, BaseModel::nominal) < options_.contained;
         if (set.members != first.members && close && !contains) {
-          rivals.push_back({set, i});
+          add(set, i);
         }
       }
     }
@@ -509,6 +545,9 @@ class Selector {
     result.all = rivals.front().set;
     result.structural = structural[rivals.front().structural];
     result.theta_moved = rivals.front().moves_theta;
+    if (!result.theta_moved) {
+      leave_out_idle(result);
+    }
     const bool moves_theta = std::ranges::any_of(result.all.members, [&](std::size_t c) {
       const std::size_t effect = table_.candidates[c].effect;
       // What stands for a cause of θ too has its size from θ held.
@@ -562,7 +601,7 @@ class Selector {
   double floor_;
   SelectionOptions options_;
   double level_ = 0.0;                  // of a test
-  double critical_ = 0.0;               // standard deviations, of that level
+  bool enough_time_ = true;             // Selection::enough_time
   std::vector<bool> moves_theta_only_;  // by effect: θ fitted again takes all of it
   std::vector<bool> does_nothing_;      // by effect: all of its columns are zeros
   double gap_ = 0.0;

@@ -40,7 +40,8 @@ struct SelectionOptions {
   double large_part = 0.8;     ///< fraction of the remainder, with `small_share`
   double small_share = 0.002;  ///< fraction of the gap, with `large_part`
   double smallest = 0.3;       ///< least gain of a cause in any case
-  double significance = 0.05;  ///< of a gain, over all effects that were tried
+  double significance = 0.05;  ///< of a gain, over all effects that were tried; of one that leaves no more than is
+                               ///< tolerated, of this effect alone
   double piece = 1.0;          ///< s, shortest stretch of time over which a gain is compared: errors that are further
                                ///< apart are taken to be independent
   double misfit = 1.0;  ///< another set is as good if it is worse by at most this many times the best set's excess

@@ -114,6 +114,15 @@ TEST(BlockGram, HeldOutErrorIsThatOfQrOnTheRows) {
   }
 }
 
+// Wilcoxon's statistic by hand: ranks 1, 2, 3 of −1, 2, 5 have 5 of 6 above zero, mean 3 and variance 3.5.
+TEST(SignedRank, IsWilcoxonsAndHasNoUseForZeros) {
+  EXPECT_NEAR(signed_rank(Eigen::Vector3d(2.0, -1.0, 5.0)), 2.0 / std::sqrt(3.5), 1e-12);
+  Eigen::VectorXd with_zeros = Eigen::VectorXd::Zero(40);
+  with_zeros.head(3) << 2.0, -1.0, 5.0;
+  EXPECT_EQ(signed_rank(with_zeros), signed_rank(with_zeros.head(3)));
+  EXPECT_EQ(signed_rank(Eigen::VectorXd::Zero(4)), 0.0);
+}
+
 TEST(HeldOutPieces, AreThoseOfQrOnTheRowsAndAddUpToTheBlocks) {
   const std::vector<RowSpace> spaces = random_spaces(5);
   const BlockGram gram(spaces, options());
