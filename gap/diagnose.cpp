@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/words.hpp>
+#include <wheelwright/gap/confidence.hpp>
 #include <wheelwright/gap/confusion.hpp>
 #include <wheelwright/gap/drive.hpp>
 #include <wheelwright/gap/effort_units.hpp>
@@ -437,6 +438,10 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   }
   from_torques(result, robot, prepared.view);
   leave_out_impossible(result, prepared.drive.model);
+  if (prepared.reference == GapReference::healthy_log && prepared.drive.has_efforts && prepared.drive.has_pose() &&
+      !options.catalogue && options.without.empty()) {
+    rate(result);
+  }
   tell("done", 1.0);
   return result;
 }

@@ -52,13 +52,24 @@ struct GapCause {
   bool parametric = false;
   std::vector<GapEstimate> parameters;
   double share = 0.0;  ///< of the gap, Shapley value over the combination; the shares add up to what is explained
+  std::optional<double> probability{};  ///< that it is there, alone or with others; nothing where no record is known
 };
 
 /// A member of the model confidence set.
 struct CredibleCauses {
   std::vector<std::string> effects;
-  double held_out_error = 0.0;  ///< mean square, in units of the noise floor's
-  double p_value = 0.0;         ///< that it is as good as the best member
+  double held_out_error = 0.0;          ///< mean square, in units of the noise floor's
+  double p_value = 0.0;                 ///< that it is as good as the best member
+  std::optional<double> probability{};  ///< that these causes are there and no others; nothing where no record is known
+};
+
+/// What became of diagnoses of one kind, on logs of which the causes were withheld from the tool.
+struct TrackRecord {
+  int logs = 0;
+  int first = 0;    ///< on which just the causes that were named first were there
+  int other = 0;    ///< on which just those of another member of the credible set were
+  int causes = 0;   ///< that were named first, on all of these logs
+  int present = 0;  ///< of them: that were there, alone or with others
 };
 
 /// Two sets of causes that look alike on this log, whatever came out.
@@ -124,9 +135,11 @@ struct Contradiction {
 /// Result of diagnose().
 struct Diagnosis {
   GapVerdict verdict = GapVerdict::no_gap;
-  std::string summary;                    ///< a few sentences for people
-  std::vector<GapCause> causes;           ///< best combination, largest share first
-  std::vector<CredibleCauses> credible;   ///< model confidence set at 90 %
+  std::string summary;                   ///< a few sentences for people
+  std::vector<GapCause> causes;          ///< best combination, largest share first
+  std::vector<CredibleCauses> credible;  ///< model confidence set at 90 %
+  std::optional<TrackRecord> record;  ///< of diagnoses like this one; with a log of the healthy robot, efforts, a pose
+                                      ///< and the catalogue whole, as it was taken
   std::vector<CredibleCauses> looked_at;  ///< best sets of every size, the empty one first: what was tried
   std::vector<ConfusablePair> confusable;
   std::vector<GapShare> where;  ///< largest share first

@@ -47,6 +47,10 @@ const char* reference_words(gap::GapReference reference) {
 
 std::string p_words(double p) { return p < 0.001 ? "< 0.001" : decimal(p, 3); }
 
+std::string chance_words(const std::optional<double>& probability) {
+  return probability ? percent(*probability, 2) : "–";
+}
+
 std::string causes_section(const Diagnosis& d) {
   if (d.causes.empty()) {
     return {};
@@ -59,9 +63,12 @@ std::string causes_section(const Diagnosis& d) {
           (parameters.empty() ? "" : "<br>") + escape(parameter_words(p.name)) + " " + escape(estimate_words(p));
     }
     rows.push_back({escape(core::capital(effect_noun(cause.effect))) + "<small>" + escape(cause.sentence) + "</small>",
-                    "<code>" + escape(cause.effect) + "</code>", numeric(percent(cause.share)), parameters});
+                    "<code>" + escape(cause.effect) + "</code>", numeric(percent(cause.share)),
+                    numeric(chance_words(cause.probability)), parameters});
   }
-  return table({"Cause", "name", numeric("share of<br>the gap"), "parameters [95 % interval]"}, rows) +
+  return table({"Cause", "name", numeric("share of<br>the gap"), numeric("chance that<br>it is there"),
+                "parameters [95 % interval]"},
+               rows) +
          note(fmt::format("The gap is what {} leaves above the noise floor: {} of the "
                           "efforts' mean square, {} after fitting θ again; the causes leave {} of the gap. Floor: {}.",
                           reference_words(d.reference), percent(d.gap), percent(d.structural), percent(d.remaining),
@@ -74,11 +81,13 @@ std::string apart_section(const Diagnosis& d, const std::string& next_manoeuvre)
     std::vector<std::vector<Cell>> rows;
     for (const gap::CredibleCauses& c : d.credible) {
       rows.push_back({escape(core::capital(effect_nouns(c.effects))), numeric(number(c.held_out_error)),
-                      numeric(p_words(c.p_value))});
+                      numeric(p_words(c.p_value)), numeric(chance_words(c.probability))});
     }
     out +=
         "<h3>Causes that this log leaves standing</h3>" +
-        table({"Causes", numeric("held-out error<br>(noise: 1)"), numeric("p: as good<br>as the best")}, rows) +
+        table({"Causes", numeric("held-out error<br>(noise: 1)"), numeric("p: as good<br>as the best"),
+               numeric("chance that it<br>is these alone")},
+              rows) +
         note(
             "A model confidence set at 90 %: each of these predicts stretches of the log that it was not fitted to as "
             "well as the best one, but for chance.");

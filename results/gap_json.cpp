@@ -38,9 +38,21 @@ Json causes_json(const std::vector<gap::GapCause>& causes) {
                     {"parameters", std::move(parameters)},
                     {"share", or_null(cause.share)},
                     {"parametric", cause.parametric},
+                    {"probability", or_null(cause.probability)},
                     {"sentence", cause.sentence}});
   }
   return list;
+}
+
+Json record_json(const std::optional<gap::TrackRecord>& record) {
+  if (!record) {
+    return nullptr;
+  }
+  return {{"logs", record->logs},
+          {"first", record->first},
+          {"other", record->other},
+          {"causes", record->causes},
+          {"present", record->present}};
 }
 
 Json figures_json(const std::vector<gap::ShrinkFigure>& figures) {
@@ -104,8 +116,10 @@ const char* name_of(gap::GapVerdict verdict) {
 Json to_json(const Diagnosis& d, const GapFiles& files) {
   Json credible = Json::array(), confusable = Json::array(), contradictions = Json::array();
   for (const gap::CredibleCauses& c : d.credible) {
-    credible.push_back(
-        {{"effects", c.effects}, {"held_out_error", or_null(c.held_out_error)}, {"p_value", or_null(c.p_value)}});
+    credible.push_back({{"effects", c.effects},
+                        {"held_out_error", or_null(c.held_out_error)},
+                        {"p_value", or_null(c.p_value)},
+                        {"probability", or_null(c.probability)}});
   }
   for (const gap::ConfusablePair& pair : d.confusable) {
     confusable.push_back({{"effects", {pair.first, pair.second}},
@@ -125,6 +139,7 @@ Json to_json(const Diagnosis& d, const GapFiles& files) {
           {"summary", d.summary},
           {"causes", causes_json(d.causes)},
           {"credible_set", std::move(credible)},
+          {"track_record", record_json(d.record)},
           {"confusable", std::move(confusable)},
           {"where", where_json(d.where)},
           {"shrink",

@@ -90,6 +90,8 @@ def main():
     if sys.argv[1:] == ["--self-test"]:
         self_test()
         return 0
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
+        sys.exit(__doc__.strip())
     program = sys.argv[1]
     helps = {}
 

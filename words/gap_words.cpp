@@ -122,10 +122,39 @@ std::string simulator_sentence(const Diagnosis& d) {
       percent(d.gap), percent(d.structural));
 }
 
+// What became of such answers where the truth was known.
+std::string record_sentence(const Diagnosis& d) {
+  if (!d.record || d.record->logs == 0) {
+    return {};
+  }
+  const gap::TrackRecord& r = *d.record;
+  const std::string on = "on simulated logs of other robots, their causes withheld,";
+  switch (d.verdict) {
+    case GapVerdict::no_gap: return fmt::format("Of {} such answers {} {} were right.", r.logs, on, r.first);
+    case GapVerdict::explained:
+      return fmt::format("Of {} such answers {} {} were right; {} of the {} causes they named were there.", r.logs, on,
+                         r.first, r.present, r.causes);
+    case GapVerdict::ambiguous:
+      return fmt::format("Of {} such answers {} the first was right in {}, another in {}, and none in {}.", r.logs, on,
+                         r.first, r.other, r.logs - r.first - r.other);
+    case GapVerdict::unexplained:
+      return d.causes.empty()
+                 ? std::string()
+                 : fmt::format("Of {} causes that were named so {}, {} were there.", r.causes, on, r.present);
+  }
+  return {};
+}
+
+// Those that fit best; the rest of many is counted.
 std::vector<std::string> credible_names(const Diagnosis& d) {
+  constexpr std::size_t kMost = 6;
+  const std::size_t all = d.credible.size(), told = all > kMost ? kMost - 1 : all;
   std::vector<std::string> names;
-  for (const gap::CredibleCauses& c : d.credible) {
-    names.push_back(effect_nouns(c.effects));
+  for (std::size_t k = 0; k < told; ++k) {
+    names.push_back(effect_nouns(d.credible[k].effects));
+  }
+  if (told < all) {
+    names.push_back(fmt::format("one of {} others that the report lists", all - told));
   }
   return names;
 }
@@ -229,6 +258,7 @@ std::vector<std::string> gap_sentences(const Diagnosis& d, const std::string& ne
   add(simulator_sentence(d));
   if (d.verdict == GapVerdict::no_gap) {
     add(shrink_sentence(d));
+    add(record_sentence(d));
     return out;
   }
   if (d.verdict == GapVerdict::ambiguous && d.credible.size() > 1) {
@@ -245,6 +275,7 @@ std::vector<std::string> gap_sentences(const Diagnosis& d, const std::string& ne
     add("Something acts on the robot that is in no model of the catalogue, or in one that this log does not show; the "
         "causes that are named are what helps most, not what is the matter.");
   }
+  add(record_sentence(d));
   add(where_sentence(d));
   if (d.verdict == GapVerdict::explained && d.credible.size() > 1) {
     const std::vector<std::string> names = credible_names(d);

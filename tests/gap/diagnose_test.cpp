@@ -82,6 +82,25 @@ TEST(Diagnose, ExplainsAndSharesAddUp) {
   EXPECT_TRUE(found.looked_at[0].effects.empty());
 }
 
+// It was counted on logs with a healthy one beside them and the catalogue whole, and says nothing of others.
+TEST(Diagnose, HasARecordWhereOneWasCounted) {
+  const Scenario scenario = noisy_scenario(robot_with("coulomb", {{"c", 0.3}}), 2);
+  const Diagnosis found = diagnosis_of(scenario, true, counted_robot());
+  ASSERT_TRUE(found.record);
+  ASSERT_EQ(found.causes.size(), 1u);
+  EXPECT_GT(found.causes[0].probability.value_or(0.0), 0.5);
+  EXPECT_TRUE(found.credible.at(0).probability);
+  DiagnoseOptions less = quick();
+  less.without = {"slope"};
+  for (const Diagnosis& other :
+       {diagnosis_of(scenario, false, counted_robot()), diagnosis_of(scenario, true, counted_robot(), less)}) {
+    EXPECT_FALSE(other.record);
+    for (const GapCause& cause : other.causes) {
+      EXPECT_FALSE(cause.probability);
+    }
+  }
+}
+
 // θ fitted again holds the load's mass, too: its size is that of the healthy robot's θ held.
 TEST(Diagnose, APayloadOffTheAxleHasItsSizeAndPlace) {
   constexpr double kMass = 2.0, kAhead = 0.2, kOfRobot = 21.0;

@@ -55,6 +55,18 @@ TEST(GapWords, EachVerdictHasItsOwnWords) {
   EXPECT_TRUE(example::holds(all_sentences(nothing), {"no effect of the catalogue explains it"}));
 }
 
+TEST(GapWords, TheRecordOfSuchAnswersIsToldWhereThereIsOne) {
+  Diagnosis d = gap_example::ambiguous();
+  EXPECT_TRUE(example::lacks(all_sentences(d), {"withheld"}));
+  d.record = gap::TrackRecord{.logs = 29, .first = 17, .other = 4, .causes = 45, .present = 31};
+  EXPECT_TRUE(example::holds(all_sentences(d),
+                             {"Of 29 such answers", "the first was right in 17, another in 4, and none in 8."}));
+  d.verdict = gap::GapVerdict::explained;
+  EXPECT_TRUE(example::holds(all_sentences(d), {"17 were right; 31 of the 45 causes they named were there."}));
+  d.verdict = gap::GapVerdict::unexplained;
+  EXPECT_TRUE(example::holds(all_sentences(d), {"Of 45 causes", "31 were there."}));
+}
+
 TEST(GapWords, WithoutEffortsNothingIsSaidOfTheTorque) {
   Diagnosis pose = gap_example::no_gap();
   ASSERT_FALSE(pose.series.empty());
