@@ -106,9 +106,9 @@ struct TuneOptions {
 void add_tuned_shapes(ShapeGrids& grids, const PreparedGap& prepared, const GapProblem& problem,
                       const std::vector<CauseSet>& looked_at, const TuneOptions& options = {});
 
-/// Adds to `grids` the shapes of each member of `set`, and of other laws of its name in its place, that leave least with
-/// θ held where it is trusted: with θ fitted beside it a curve that is nearly right and a change of θ do as well, and
-/// would be two causes. Each from the best point of the table of `problem`, by variable projection.
+/// Adds to `grids` the shapes of each member of `set`, and of other laws of its name in its place, that leave least
+/// with θ held where it is trusted: with θ fitted beside it a curve that is nearly right and a change of θ do as well,
+/// and would be two causes. Each from the best point of the table of `problem`, by variable projection.
 void add_shapes_with_theta_held(ShapeGrids& grids, const PreparedGap& prepared, const GapProblem& problem,
                                 const CauseSet& set);
 

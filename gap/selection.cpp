@@ -583,9 +583,10 @@ class Selector {
     for (const CauseSet& set : rivals) {
       losses.push_back(set.loss);
     }
-    const double rows = table_.gram->rows().mean();
+    // What is worse by less than a tenth of a cause's least gain is as good; by how much more is for the blocks to say.
+    const double as_good = std::max(options_.misfit * excess(rivals.front()), 0.1 * options_.smallest);
     const std::vector<double> p =
-        model_confidence_set(losses, {.margin = margin(rivals.front()) * rows, .seed = options_.seed});
+        model_confidence_set(losses, {.margin = as_good * table_.gram->rows().mean(), .seed = options_.seed});
     for (std::size_t i = 0; i < rivals.size(); ++i) {
       if (i == 0 || p[i] >= options_.level) {
         result.credible.push_back({rivals[i], p[i]});

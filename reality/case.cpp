@@ -169,7 +169,8 @@ std::vector<Subject> subjects(std::string_view effect) {
 
 namespace {
 
-/// No severity makes a gap that stands out of the noise, or the one that does is more than the robot stands on some drive.
+/// No severity makes a gap that stands out of the noise, or the one that does is more than the robot stands on some
+/// drive.
 class Unfit : public Error {
  public:
   using Error::Error;

@@ -3,7 +3,7 @@
 """How often what `wheelwright gap` says is true, by the kind of its answer, as Markdown.
 
     calibrate_gap.py ANSWERS.json RESULTS [ANSWERS.json RESULTS]...    a pair for each world; RESULTS has CASE/gap.json
-    calibrate_gap.py --judge ANSWERS.json RESULTS [...]                the probabilities that gap.json has, against truth
+    calibrate_gap.py --judge ANSWERS.json RESULTS [...]                what gap.json promises, against truth
 
 The first counts diagnoses by verdict and number of causes (the table of gap/confidence.cpp) and judges each world by the
 others: what the rest promises for its answers, and what came of it. Names are exact; a payload with the shift of the centre
@@ -107,10 +107,24 @@ def count(pairs, out):
                   f"| {logs * listed:.1f} | {record.of['first'] + record.of['other']} |", file=out)
 
 
+def promised(gap):
+    """Probabilities that the first set is right, and that some set is."""
+    if gap["credible_set"]:
+        all_sets = [member["probability"] for member in gap["credible_set"]]
+        return all_sets[0], sum(all_sets)
+    record = gap["track_record"]
+    first = (record["first"] + 0.5) / (record["logs"] + 1.5)
+    return first, first
+
+
 def judge(pairs, out):
-    """Probabilities in bins: how many were promised, how many came true."""
+    """What was promised, and how many came true: by world, and by tenths of the probabilities."""
     bins = {"credible sets": defaultdict(list), "causes of the verdict": defaultdict(list)}
-    for _, gap, truth in diagnoses(pairs):
+    worlds = defaultdict(list)
+    for world, gap, truth in diagnoses(pairs):
+        if gap["track_record"]:
+            what = outcome(gap, truth)
+            worlds[world].append((*promised(gap), what == "first", what != "neither"))
         for member in gap["credible_set"]:
             if member.get("probability") is not None:
                 bins["credible sets"][min(int(10 * member["probability"]), 9)].append(
@@ -119,6 +133,10 @@ def judge(pairs, out):
             if cause.get("probability") is not None:
                 bins["causes of the verdict"][min(int(10 * cause["probability"]), 9)].append(
                     (cause["probability"], cause["effect"] in truth))
+    print("| world | logs | first: promised | came | listed at all: promised | came |\n|---|---|---|---|---|---|", file=out)
+    for world, values in worlds.items():
+        first, listed, first_came, listed_came = (sum(column) for column in zip(*values))
+        print(f"| {world} | {len(values)} | {first:.1f} | {first_came} | {listed:.1f} | {listed_came} |", file=out)
     for what, rows in bins.items():
         print(f"\n| {what}: probability | cases | promised | came true |\n|---|---|---|---|", file=out)
         for tenth, values in sorted(rows.items()):
