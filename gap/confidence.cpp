@@ -10,12 +10,12 @@ TrackRecord track_record(const Diagnosis& diagnosis) {
   switch (diagnosis.verdict) {
     case GapVerdict::no_gap: return {.logs = 25, .first = 24, .other = 0, .causes = 0, .present = 0};
     case GapVerdict::explained:
-      return several ? TrackRecord{.logs = 39, .first = 33, .other = 0, .causes = 78, .present = 72}
-                     : TrackRecord{.logs = 177, .first = 168, .other = 0, .causes = 177, .present = 172};
+      return several ? TrackRecord{.logs = 40, .first = 34, .other = 0, .causes = 80, .present = 74}
+                     : TrackRecord{.logs = 181, .first = 172, .other = 0, .causes = 181, .present = 176};
     case GapVerdict::ambiguous:
       return several ? TrackRecord{.logs = 16, .first = 7, .other = 1, .causes = 33, .present = 18}
-                     : TrackRecord{.logs = 23, .first = 18, .other = 3, .causes = 23, .present = 20};
-    case GapVerdict::unexplained: return {.logs = 78, .first = 16, .other = 5, .causes = 91, .present = 31};
+                     : TrackRecord{.logs = 21, .first = 16, .other = 3, .causes = 21, .present = 18};
+    case GapVerdict::unexplained: return {.logs = 75, .first = 13, .other = 5, .causes = 87, .present = 27};
   }
   return {};
 }
