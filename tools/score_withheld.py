@@ -305,7 +305,8 @@ def report_profiles(answers, results, rest=None, out=sys.stdout):
             rows[row][profile].add(good)
 
         if kind in ("single", "parametric"):
-            add("one effect: in the answer", any(truth <= member for member in kept))
+            add("one effect: in the answer, alone or beside others", any(truth <= member for member in kept))
+            add("one effect: in the answer, alone", any(truth == member for member in kept))
             add("one effect: alone, and explained", explained and causes == truth)
         elif kind == "pair":
             add("two effects: exactly these", causes == truth)
@@ -319,9 +320,9 @@ def report_profiles(answers, results, rest=None, out=sys.stdout):
             add("a gap called no_gap", verdict == "no_gap")
     profiles = sorted({p for row in rows.values() for p in row}, reverse=True)
     print(f"| measure | {' | '.join(profiles)} |\n|---|{'---|' * len(profiles)}", file=out)
-    for row in ("one effect: in the answer", "one effect: alone, and explained", "two effects: exactly these",
-                "two effects: among those said", "no effect: no_gap", "outside the catalogue: unexplained",
-                "blamed on one wrong cause", "a gap called no_gap"):
+    for row in ("one effect: in the answer, alone or beside others", "one effect: in the answer, alone",
+                "one effect: alone, and explained", "two effects: exactly these", "two effects: among those said",
+                "no effect: no_gap", "outside the catalogue: unexplained", "blamed on one wrong cause", "a gap called no_gap"):
         print(f"| {row} | {' | '.join(str(rows[row][p]) for p in profiles)} |", file=out)
 
 
