@@ -43,6 +43,7 @@ struct ExactUnicycle {
   bool clothoids = false;
   std::size_t hold = 1;  ///< rows with the same pose
   PoseLaw law = PoseLaw::two_point;
+  std::uint64_t errors_seed = 0;  ///< > 0: errors are drawn apart from the drive
   // From fault_at on (s):
   double fault_at = 1e300;
   double slip_along = 0.0, slip_across = 0.0;  ///< m/s
@@ -57,7 +58,8 @@ inline constexpr double kClothoidAcceleration = 40.0;
 /// Its log (phi_r, phi_l, x, y, theta).
 inline LogTable drive(const ExactUnicycle& a, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  const auto uniform = [&] { return std::ldexp(static_cast<double>(random() >> 11), -53); };
+  auto draw = &random;
+  const auto uniform = [&] { return std::ldexp(static_cast<double>((*draw)() >> 11), -53); };
   const auto sign = [&] { return uniform() < 0.5 ? -1.0 : 1.0; };
   LogTable log;
   log.names = {"phi_r", "phi_l", "x", "y", "theta"};
@@ -72,8 +74,10 @@ inline LogTable drive(const ExactUnicycle& a, std::uint64_t seed) {
   std::array<double, 2> phi{}, shown{}, speed{};
   std::array<double, 3> held{1.0, 1.0, 1.0}, sum{}, seen{};
   double correction = 0.0;
+  std::mt19937_64 apart(a.errors_seed);
   for (std::size_t k = 0; k < rows; ++k) {
     // The pose that is seen now.
+    draw = a.errors_seed > 0 ? &apart : &random;
     if (k % a.hold == 0) {
       const double free = 1.0 - a.bias_share;
       std::array<double, 3> e{};
@@ -113,6 +117,7 @@ inline LogTable drive(const ExactUnicycle& a, std::uint64_t seed) {
       log.columns[2 + i].push_back(seen[i]);
     }
     // To the next sample.
+    draw = &random;
     const bool fault = t >= a.fault_at;
     const double h = (1.0 + a.jitter * (2.0 * uniform() - 1.0)) / a.rate;
     const auto wanted = [&](double at) {
