@@ -161,6 +161,11 @@ Eigen::Index first_at(const Eigen::VectorXd& t, double from) {
   return std::lower_bound(t.data(), t.data() + t.size(), from) - t.data();
 }
 
+Range rows_within(const RowSpace& space, const std::pair<double, double>& times) {
+  const Eigen::Index first = first_at(space.t, times.first);
+  return {first, std::max(first, first_at(space.t, times.second))};
+}
+
 void check_spaces(const std::vector<RowSpace>& spaces) {
   check::that(!spaces.empty(), "BlockGram spaces", "at least one");
   for (const RowSpace& space : spaces) {
@@ -208,6 +213,27 @@ void accumulate(const RowSpace& space, Range rows, Eigen::MatrixXd& gram) {
 }
 
 }  // namespace
+
+Eigen::VectorXd residual(const RowSpace& space, const Subset& subset, const Eigen::VectorXd& coefficients,
+                         Eigen::Index first, Eigen::Index count) {
+  Eigen::VectorXd left = space.response.segment(first, count);
+  for (const std::size_t c : subset.fixed) {
+    if (space.columns[c].size() > 0) {
+      left -= space.columns[c].segment(first, count);
+    }
+  }
+  for (Eigen::Index k = 0; k < coefficients.size(); ++k) {
+    const Eigen::VectorXd& column = space.columns[subset.columns[static_cast<std::size_t>(k)]];
+    if (column.size() > 0) {
+      left -= coefficients[k] * column.segment(first, count);
+    }
+  }
+  return left;
+}
+
+Eigen::VectorXd residual(const RowSpace& space, const Subset& subset, const Eigen::VectorXd& coefficients) {
+  return residual(space, subset, coefficients, 0, space.t.size());
+}
 
 // One subset's normal equations, in units of the columns' norms; index [(i, j)][block], i >= j.
 struct BlockGram::Problem {
@@ -361,17 +387,17 @@ BlockGram::BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& op
   const std::size_t pairs = (columns_ + 1) * (columns_ + 2) / 2;
   gram_.assign(pairs * lanes(), 0.0);
   rows_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(blocks_));
-  const double infinity = std::numeric_limits<double>::infinity();
   core::for_all(blocks_, options.threads, [&](std::size_t b) {
-    const auto place = static_cast<double>(b);
-    const double from = b == 0 ? -infinity : begin + place * length;
-    const double to = b + 1 == blocks_ ? infinity : begin + (place + 1.0) * length;
     const auto size = static_cast<Eigen::Index>(columns_ + 1);
     Eigen::MatrixXd within = Eigen::MatrixXd::Zero(size, size), near = within;
+    const auto border = [&](const RowSpace& space, std::size_t which) {
+      return which == blocks_ ? space.t.size() : first_at(space.t, begin + static_cast<double>(which) * length);
+    };
     for (const RowSpace& space : spaces) {
-      const Range block{first_at(space.t, from), first_at(space.t, to)};
-      Range core{std::min(first_at(space.t, from + options.purge), block.last), block.last};
-      core.last = std::max(core.first, std::min(first_at(space.t, to - options.purge), block.last));
+      const Range block{border(space, b), border(space, b + 1)};
+      Range core = rows_within(space, interiors_[b]);
+      core.first = std::min(core.first, block.last);
+      core.last = std::max(core.first, std::min(core.last, block.last));
       accumulate(space, core, within);
       accumulate(space, {block.first, core.first}, near);
       accumulate(space, {core.last, block.last}, near);
@@ -466,17 +492,17 @@ BlockGram::Problem BlockGram::gather(const Subset& subset) const {
   return q;
 }
 
-Eigen::VectorXd BlockGram::held_out_loss(const Subset& subset) const {
+BlockGram::Problem BlockGram::held_out(const Subset& subset) const {
   Problem problem = gather(subset);
   problem.solve_without_signs();
   problem.mend_signs(subset.sign);
-  return problem.losses();
+  return problem;
 }
 
+Eigen::VectorXd BlockGram::held_out_loss(const Subset& subset) const { return held_out(subset).losses(); }
+
 Eigen::MatrixXd BlockGram::held_out_coefficients(const Subset& subset) const {
-  Problem problem = gather(subset);
-  problem.solve_without_signs();
-  problem.mend_signs(subset.sign);
+  const Problem problem = held_out(subset);
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   Eigen::MatrixXd coefficients = Eigen::Map<const Rows>(problem.x.data(), static_cast<Eigen::Index>(problem.k),
                                                         static_cast<Eigen::Index>(blocks_));
@@ -500,22 +526,11 @@ Eigen::VectorXd held_out_pieces(const BlockGram& gram, const std::vector<RowSpac
     const std::size_t first_piece = losses.size();
     losses.resize(first_piece + static_cast<std::size_t>(pieces), 0.0);
     for (const RowSpace& space : spaces) {
-      const Eigen::Index first = first_at(space.t, from),
-                         count = std::max<Eigen::Index>(first_at(space.t, to) - first, 0);
-      Eigen::VectorXd left = space.response.segment(first, count);
-      for (const std::size_t fixed : subset.fixed) {
-        if (space.columns[fixed].size() > 0) {
-          left -= space.columns[fixed].segment(first, count);
-        }
-      }
-      for (std::size_t i = 0; i < subset.columns.size(); ++i) {
-        if (const Eigen::VectorXd& column = space.columns[subset.columns[i]]; column.size() > 0) {
-          left -= coefficients(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(block)) *
-                  column.segment(first, count);
-        }
-      }
-      for (Eigen::Index k = 0; k < count; ++k) {
-        const double place = (space.t[first + k] - from) / (to - from) * static_cast<double>(pieces);
+      const Range rows = rows_within(space, gram.interiors()[block]);
+      const Eigen::VectorXd left = residual(space, subset, coefficients.col(static_cast<Eigen::Index>(block)),
+                                            rows.first, rows.last - rows.first);
+      for (Eigen::Index k = 0; k < left.size(); ++k) {
+        const double place = (space.t[rows.first + k] - from) / (to - from) * static_cast<double>(pieces);
         const auto piece = std::min(static_cast<Eigen::Index>(place), pieces - 1);
         losses[first_piece + static_cast<std::size_t>(piece)] += std::pow(left[k] / space.floor, 2);
       }

@@ -58,6 +58,15 @@ struct Subset {
   std::vector<double> precision{};  ///< of each one's Gaussian prior about 0: its inverse variance; may be empty (none)
 };
 
+/// Residual of the response of `space` under `subset` with the first of its coefficients; without any, the response
+/// less the fixed columns.
+[[nodiscard]] Eigen::VectorXd residual(const RowSpace& space, const Subset& subset,
+                                       const Eigen::VectorXd& coefficients);
+
+/// The same of `count` rows from `first` on.
+[[nodiscard]] Eigen::VectorXd residual(const RowSpace& space, const Subset& subset, const Eigen::VectorXd& coefficients,
+                                       Eigen::Index first, Eigen::Index count);
+
 /// A subset fitted to all rows.
 struct BlockFit {
   Eigen::VectorXd coefficients;
@@ -127,6 +136,7 @@ class BlockGram {
 
   void check_subset(const Subset& subset) const;
   [[nodiscard]] Problem gather(const Subset& subset) const;
+  [[nodiscard]] Problem held_out(const Subset& subset) const;
 
   std::size_t columns_ = 0;
   std::size_t blocks_ = 0;

@@ -216,6 +216,9 @@ void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Ef
     const auto effect = std::ranges::find(catalogue, cause.effect, &Effect::name);
     return effect != catalogue.end() && effect->after_reversals;
   });
+  const auto has_play = [&](const CredibleCauses& set) {
+    return std::ranges::find(set.effects, play->name) != set.effects.end();
+  };
   const double left = result.remaining * result.gap;
   if (fast.play && play != catalogue.end() && !known) {
     GapCause cause{play->name, play->sentence, play->parametric, {}, 0.0};
@@ -238,14 +241,13 @@ void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Ef
       result.credible.push_back({{}, 1.0, 1.0});
     }
     for (CredibleCauses& set : result.credible) {
-      if (std::ranges::find(set.effects, play->name) == set.effects.end()) {
+      if (!has_play(set)) {
         set.effects.push_back(play->name);
       }
     }
     result.notes.push_back(fmt::format(
-        "between {:.0f} and {:.0f} 1/s, above the filter's band, the mean square of what the model leaves "
-        "is {:.2f} times "
-        "the healthy log's just after reversals of the torque and {:.2f} times elsewhere, while it changes as "
+        "between {:.0f} and {:.0f} 1/s, above the filter's band, the mean square of what the model leaves is {:.2f} "
+        "times the healthy log's just after reversals of the torque and {:.2f} times elsewhere, while it changes as "
         "fast: play. How wide it is cannot be said without the rotor's inertia",
         result.beta, fast.beta, fast.after_reversals, fast.elsewhere));
   } else if (fast.above && result.verdict == GapVerdict::no_gap) {
@@ -255,17 +257,13 @@ void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Ef
         "square, and not only after reversals of the torque: something fast that no cause here explains",
         result.beta, fast.beta, fast.left));
   }
-  const auto has_play = [&](const auto& set) {
-    return std::ranges::find(set.effects, play->name) != set.effects.end();
-  };
   if (fast.play && play != catalogue.end() && result.verdict == GapVerdict::unexplained && left <= fast.effort_square &&
       !result.credible.empty() && has_play(result.credible.front())) {
     std::erase_if(result.credible, [&](const CredibleCauses& set) { return !has_play(set); });
     result.verdict = result.credible.size() > 1 ? GapVerdict::ambiguous : GapVerdict::explained;
     result.notes.push_back(
         fmt::format("{:.0f} % of the gap stay below that band, no more than what play adds in it: they are taken for "
-                    "what its contact "
-                    "does there, which no formula here has",
+                    "what its contact does there, which no formula here has",
                     100.0 * result.remaining));
   }
 }

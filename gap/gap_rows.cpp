@@ -382,22 +382,6 @@ std::size_t add_column(std::vector<RowSpace>& spaces, std::vector<Eigen::VectorX
   return spaces.front().columns.size() - 1;
 }
 
-Eigen::VectorXd residual(const RowSpace& space, const Subset& subset, const Eigen::VectorXd& coefficients) {
-  Eigen::VectorXd left = space.response;
-  for (const std::size_t c : subset.fixed) {
-    if (space.columns[c].size() > 0) {
-      left -= space.columns[c];
-    }
-  }
-  for (Eigen::Index k = 0; k < coefficients.size(); ++k) {
-    const Eigen::VectorXd& column = space.columns[subset.columns[static_cast<std::size_t>(k)]];
-    if (column.size() > 0) {
-      left -= coefficients[k] * column;
-    }
-  }
-  return left;
-}
-
 std::vector<Eigen::VectorXd> rows_of(const Drive& drive, const GapRows& rows, const Column& column,
                                      const GapRowOptions& options) {
   std::vector<Eigen::VectorXd> parts(rows.spaces.size());

@@ -136,11 +136,6 @@ struct GapRows {
 /// Adds a column, one part for each space, and returns its index.
 std::size_t add_column(std::vector<RowSpace>& spaces, std::vector<Eigen::VectorXd> parts);
 
-/// Residual of the response of `space` under `subset` with the first of its coefficients; without any, the response
-/// less the fixed columns.
-[[nodiscard]] Eigen::VectorXd residual(const RowSpace& space, const Subset& subset,
-                                       const Eigen::VectorXd& coefficients);
-
 /// The values of `signal` at `rows`.
 [[nodiscard]] Eigen::VectorXd picked(const Eigen::VectorXd& signal, const std::vector<Eigen::Index>& rows);
 
