@@ -12,6 +12,8 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/for_all.hpp>
 #include <wheelwright/detector/odometry_faults.hpp>
+#include <wheelwright/detector/pose_margins.hpp>
+#include <wheelwright/detector/smallest_certain.hpp>
 
 namespace wheelwright::commission {
 namespace {
@@ -82,11 +84,34 @@ std::vector<FaultMaps> maps_of(const std::vector<detector::FaultMargins>& margin
   return maps;
 }
 
+// Those that leave a trace in a pose.
+bool shows_in_pose(const FaultType& fault) { return moves(fault) || fault.seen.size() > 0; }
+
+// The smaller of both sizes, onset by onset and window by window.
+void take_smaller(std::vector<detector::FaultMargins>& all, const std::vector<detector::FaultMargins>& others) {
+  for (const detector::FaultMargins& other : others) {
+    const auto own = std::ranges::find_if(all, [&](const detector::FaultMargins& each) {
+      return each.fault.name == other.fault.name && each.side == other.side;
+    });
+    for (std::size_t k = 0; k < other.onsets.size(); ++k) {
+      std::vector<double>& certain = own->onsets[k].certain;
+      const std::vector<double>& there = other.onsets[k].certain;
+      certain.resize(std::max(certain.size(), there.size()), core::kInfinity);
+      for (std::size_t w = 0; w < there.size(); ++w) {
+        certain[w] = std::min(certain[w], there[w]);
+      }
+    }
+  }
+}
+
 // Margins at the stated risk, from some of the onsets of `worst_case`.
 void add_at_risk(MarginSurvey& survey, LogSource& log, const OnlineModel& model,
                  const detector::ReferenceMotion& motion, const std::vector<FaultType>& faults,
                  const std::vector<detector::OnsetMargin>& worst_case, const MarginSurveyOptions& options) {
-  if (!model.at_risk) {
+  const bool of_pose = model.kinematic && model.kinematic->at_risk &&
+                       std::ranges::all_of(model.kinematic->measurement.columns(),
+                                           [&](const std::string& name) { return log.find(name).has_value(); });
+  if (!model.at_risk && !of_pose) {
     survey.without_risk = "the model says nothing at a stated risk (docs/risk.md)";
     return;
   }
@@ -94,16 +119,19 @@ void add_at_risk(MarginSurvey& survey, LogSource& log, const OnlineModel& model,
     survey.without_risk = "it was not asked for";
     return;
   }
-  const std::optional<detector::SumDrive> drive = detector::read_sum_drive(log, model, motion);
-  if (!drive) {
+  const std::optional<detector::SumDrive> drive =
+      model.at_risk ? detector::read_sum_drive(log, model, motion) : std::nullopt;
+  if (!drive && !of_pose) {
     survey.without_risk = "what the sensors may write of this drive leaves no bound on the motion between samples";
     return;
   }
   std::vector<std::size_t> onsets;
+  std::vector<double> times;
   std::vector<detector::ManoeuvreKind> kinds;
   const std::size_t stride = (worst_case.size() + options.risk_onsets - 1) / options.risk_onsets;
   for (std::size_t k = 0; k < worst_case.size(); k += stride) {
     onsets.push_back(worst_case[k].instant);
+    times.push_back(worst_case[k].t);
     kinds.push_back(worst_case[k].kind);
   }
   detector::SumMarginOptions sums;
@@ -116,12 +144,39 @@ void add_at_risk(MarginSurvey& survey, LogSource& log, const OnlineModel& model,
   }
   sums.threads = options.margins.threads;
   sums.progress = options.margins.progress;
-  RiskMargins result{model.at_risk->risk, drive->miss, torque_false_alarms(model),
-                     sums.windows,        {},          model.at_risk->warrant};
-  result.margins = detector::margins_at_risk(*drive, model, motion, faults, onsets, sums);
-  for (detector::FaultMargins& margins : result.margins) {
-    for (std::size_t k = 0; k < kinds.size(); ++k) {
-      margins.onsets[k].kind = kinds[k];
+  RiskMargins result;
+  result.windows = sums.windows;
+  if (drive) {
+    result.torque = true;
+    result.risk = model.at_risk->risk;
+    result.miss = drive->miss;
+    result.false_alarms = torque_false_alarms(model);
+    result.warrant = model.at_risk->warrant;
+    result.margins = detector::margins_at_risk(*drive, model, motion, faults, onsets, sums);
+  } else {
+    result.margins = detector::sides_of(faults, onsets.size());
+    for (detector::FaultMargins& margins : result.margins) {
+      for (std::size_t k = 0; k < onsets.size(); ++k) {
+        margins.onsets[k].instant = onsets[k];
+        margins.onsets[k].t = times[k];
+      }
+    }
+  }
+  if (of_pose) {
+    std::vector<FaultType> visible;
+    std::ranges::copy_if(faults, std::back_inserter(visible), shows_in_pose);
+    const detector::PoseSumDrive poses = detector::read_pose_drive(log, *model.kinematic, pose_false_alarms(model));
+    result.risk += model.kinematic->at_risk->risk;
+    result.miss = std::max(result.miss, poses.miss);
+    result.false_alarms += pose_false_alarms(model);
+    result.pose = detector::pose_margins_at_risk(poses, *model.kinematic, model.model, visible, times, sums);
+    take_smaller(result.margins, result.pose);
+  }
+  for (std::vector<detector::FaultMargins>* all : {&result.margins, &result.pose}) {
+    for (detector::FaultMargins& margins : *all) {
+      for (std::size_t k = 0; k < kinds.size(); ++k) {
+        margins.onsets[k].kind = kinds[k];
+      }
     }
   }
   survey.at_risk = std::move(result);
@@ -195,7 +250,7 @@ MarginSurvey survey_margins(LogSource& log, const OnlineModel& model, const Marg
                             .warrant = k.warrant};
   std::vector<FaultType> visible;
   for (const FaultType& fault : faults) {
-    if (moves(fault) || fault.seen.size() > 0) {
+    if (shows_in_pose(fault)) {
       visible.push_back(fault);
     } else {
       kinematic.blind.push_back(fault.name);

@@ -46,13 +46,15 @@ struct ResidualMargins {
 
 /// Margins in the sums over scales: certain but for a stated chance.
 struct RiskMargins {
-  double risk = 0.0;            ///< that the set lacks the true parameters
+  double risk = 0.0;            ///< that the sets lack the true parameters
   double miss = 0.0;            ///< a fault of a certain size is missed with at most this probability
   double false_alarms = 0.0;    ///< at most as many are to be expected in a second
   std::vector<double> windows;  ///< s: those of the survey, and 1, 5, 10 and 20 s
   std::vector<detector::FaultMargins>
-      margins;  ///< of the whole catalogue; of its onsets at most MarginSurveyOptions::risk_onsets
+      margins;  ///< in either residual, of the whole catalogue; of its onsets at most MarginSurveyOptions::risk_onsets
+  std::vector<detector::FaultMargins> pose;           ///< those of them that are seen in the pose, in it alone
   core::Warrant warrant = core::Warrant::guaranteed;  ///< extrapolated where the errors were estimated from a log
+  bool torque = false;                                ///< sums of torque take part
 };
 
 /// Everything that `wheelwright margins` says.

@@ -124,36 +124,45 @@ OdometryReference read_odometry(LogSource& log, filter::OdometryFilter filter, c
   return reference;
 }
 
+OdometrySignature odometry_signature(const FaultType& fault, const Model& model) {
+  validate(fault, model);
+  check::that(model.coordinates.size() == 2 && model.joints.size() == 2, "model", "a differential drive");
+  const Eigen::Matrix2d to_body = model.motion, to_joint = to_body.inverse();
+  OdometrySignature signature;
+  if (fault.motion.size() > 0) {
+    signature.rolled = to_joint * fault.motion * to_body;
+  }
+  if (fault.seen.size() > 0) {
+    signature.shown = to_joint * fault.seen * to_body;
+  }
+  if (fault.slip.size() > 0) {
+    signature.along = fault.slip[0];
+    signature.turning = fault.slip[1];
+  }
+  return signature;
+}
+
+double OdometrySignature::read_share() const {
+  const auto share = [](const Eigen::Matrix2d& joint) { return joint.cwiseAbs().rowwise().sum().maxCoeff(); };
+  return share(rolled) + share(shown);
+}
+
 OdometryFaultRows::OdometryFaultRows(const FaultType& fault, const Model& model,
                                      const filter::OdometryMeasurement& measurement, const OdometryReference& reference,
                                      const Box& hull)
     : fault_(fault),
       reference_(&reference),
       measurement_(measurement),
+      signature_(odometry_signature(fault, model)),
       n_(measurement.outputs().size()),
       p_(measurement.parameters().size()) {
-  validate(fault_, model);
-  check::that(model.coordinates.size() == 2 && model.joints.size() == 2, "model", "a differential drive");
   check::that(hull.dimension() == p_, "hull", "one side for each parameter");
-  const Eigen::Matrix2d to_body = model.motion, to_joint = to_body.inverse();
-  if (fault_.motion.size() > 0) {
-    joint_motion_ = to_joint * fault_.motion * to_body;
-  }
-  if (fault_.seen.size() > 0) {
-    joint_seen_ = to_joint * fault_.seen * to_body;
-  }
-  if (fault_.slip.size() > 0) {
-    along_ = fault_.slip[0];
-    turning_ = fault_.slip[1];
-  }
   most_kappa_ = std::max(std::abs(fault_.kappa(fault_.range.lower)), std::abs(fault_.kappa(fault_.range.upper)));
   const std::size_t gains = measurement_.position ? 2 : 0;
   for (std::size_t w = 0; w < 2; ++w) {
     radius_[w] = measurement_.position ? largest(hull.sides[w]) : 0.0;
     yaw_gain_[w] = hull.sides[gains + w];
   }
-  const auto share = [](const Eigen::Matrix2d& joint) { return joint.cwiseAbs().rowwise().sum().maxCoeff(); };
-  read_share_ = share(joint_motion_) + share(joint_seen_);
   const auto n = static_cast<Eigen::Index>(n_), p = static_cast<Eigen::Index>(p_);
   rows_ = {core::RowMatrix::Zero(n, p), core::RowMatrix::Zero(n, p), core::RowMatrix::Zero(n, p),
            Eigen::VectorXd::Zero(n)};
@@ -186,10 +195,10 @@ bool OdometryFaultRows::next() {
   };
   const double s = 0.5 * (profile(k_) + profile(k_ + 1));
   const Eigen::Vector2d way = motion.joint_angle.col(a + 1) - motion.joint_angle.col(a);
-  const Eigen::Vector2d rolled = s * joint_motion_ * way, shown = s * joint_seen_ * way;
+  const Eigen::Vector2d rolled = s * signature_.rolled * way, shown = s * signature_.shown * way;
   const Eigen::Vector2d e = mean_direction(motion.heading[k_], motion.heading[k_ + 1]), left(-e[1], e[0]);
   Sums sums = sums_.back();
-  Interval turn{s * turning_ * h, s * turning_ * h};
+  Interval turn{s * signature_.turning * h, s * signature_.turning * h};
   for (std::size_t w = 0; w < 2; ++w) {
     const auto j = static_cast<Eigen::Index>(w);
     sums.rolled[w] += rolled[j] * e;
@@ -203,10 +212,10 @@ bool OdometryFaultRows::next() {
     sums.way += 0.5 * std::abs(way[j]) * radius_[w];
     sums.moved += 0.5 * std::abs(rolled[j]) * radius_[w];
   }
-  sums.slipped += s * h * (along_ * e + fault_.lateral * left);
-  sums.slipped_turn += s * h * turning_;
+  sums.slipped += s * h * (signature_.along * e + fault_.lateral * left);
+  sums.slipped_turn += s * h * signature_.turning;
   sums.turn_size += largest(turn);
-  sums.moved += s * h * std::hypot(along_, fault_.lateral);
+  sums.moved += s * h * std::hypot(signature_.along, fault_.lateral);
   sums_.push_back(sums);
   ++k_;
   write();
@@ -248,7 +257,7 @@ void OdometryFaultRows::write() {
   if (motion.measured) {
     const auto n = static_cast<Eigen::Index>(n_);
     const auto dY = motion.rows.dY.middleRows(static_cast<Eigen::Index>(k_) * n, n);
-    range_ = (read_share_ * dY.rowwise().maxCoeff()).replicate(1, dY.cols());
+    range_ = (signature_.read_share() * dY.rowwise().maxCoeff()).replicate(1, dY.cols());
   }
 }
 

@@ -26,6 +26,19 @@ struct OdometryReference {
 /// Throws InvalidArgument when the log lacks a column of the filter's measurement.
 [[nodiscard]] OdometryReference read_odometry(LogSource& log, filter::OdometryFilter filter, const Model& model);
 
+/// What a fault does to the wheels' ways, in joints.
+struct OdometrySignature {
+  Eigen::Matrix2d rolled = Eigen::Matrix2d::Zero();  ///< K: truly rolled beyond what encoders would show
+  Eigen::Matrix2d shown = Eigen::Matrix2d::Zero();   ///< S: shown beyond it
+  double along = 0.0, turning = 0.0;                 ///< a, m/s and rad/s
+
+  /// The largest share of the encoders' errors in K and S of what they show.
+  [[nodiscard]] double read_share() const;
+};
+
+/// That of `fault`. Throws InvalidArgument where it does not fit `model`, a differential drive.
+[[nodiscard]] OdometrySignature odometry_signature(const FaultType& fault, const Model& model);
+
 /// Rows of the kinematic residual after a fault's onset. With q_j what a wheel truly rolls beyond what its encoder
 /// would show without a fault in step j (s K in joints, times its way) and σ_j what the encoder shows beyond it (s S),
 /// the displacement is Σ E_j (Δφ + κ q) r/2 + κ Σ (E_j s a_1 + E_j⊥ s d) h, seen as Σ E_j (Δφ + κ σ) r/2, and alike for
@@ -61,10 +74,8 @@ class OdometryFaultRows final : public FaultRows {
   FaultType fault_;
   const OdometryReference* reference_;
   filter::OdometryMeasurement measurement_;
-  Eigen::Matrix2d joint_motion_ = Eigen::Matrix2d::Zero(), joint_seen_ = Eigen::Matrix2d::Zero();  // K, S in joints
-  double along_ = 0.0, turning_ = 0.0;                                                             // a_1, a_2
+  OdometrySignature signature_;
   double most_kappa_ = 0.0;
-  double read_share_ = 0.0;         // of the encoders' errors in K and S of what they show
   std::array<double, 2> radius_{};  // at most
   std::array<Interval, 2> yaw_gain_{};
   std::size_t n_ = 0, p_ = 0;

@@ -173,6 +173,7 @@ PoseSumDetector::PoseSumDetector(const KinematicModel& model, PoseSumOptions opt
 
 void PoseSumDetector::restart() {
   started_ = false;
+  step_ = {};
   oldest_ = count_ = 0;
   z_ = {};
   foreseen_ = {};
@@ -213,7 +214,8 @@ bool PoseSumDetector::read(double t, std::span<const double> sample) {
   }
   const double turn =
       wrapped - wrapped_ - 2.0 * std::numbers::pi * std::round((wrapped - wrapped_) / (2.0 * std::numbers::pi));
-  step_ = {.begin = pose_time_,
+  step_ = {.number = first ? 0 : step_.number + 1,
+           .begin = pose_time_,
            .h = h,
            .turn = turn,
            .by = {x - x_, y - y_},
@@ -417,6 +419,7 @@ bool PoseSumDetector::step(double t, std::span<const double> sample) {
   foresee(step_.begin);
   weigh(step_);
   take(step_);
+  ++steps_;
   if (count_ < ring_.size()) {
     Waiting& next = ring_[(oldest_ + count_++) % ring_.size()];
     next.t = t;

@@ -75,6 +75,19 @@ struct PoseSumOptions {
 /// per sample do not depend on time.
 class PoseSumDetector {
  public:
+  using Vector = std::array<double, 2>;  ///< in the frame of the pose; of sums of headings the first alone
+
+  /// A step from one pose to the next, as they were read.
+  struct Step {
+    std::size_t number = 0;       ///< since restart(), from 1 on
+    double begin = 0.0, h = 0.0;  ///< s
+    double turn = 0.0;            ///< of the heading, rad
+    Vector by{};                  ///< of the position, m
+    Vector mean{};                ///< E_j
+    Vector moved{};               ///< Δφ of the wheels, rad
+    Vector size{};                ///< |Δφ|
+  };
+
   /// Throws InvalidArgument where `model.at_risk` is missing or makes no sense, or there is no heading.
   explicit PoseSumDetector(const KinematicModel& model, PoseSumOptions options = {});
 
@@ -94,6 +107,15 @@ class PoseSumDetector {
   [[nodiscard]] const std::vector<double>& scales() const { return risk_.scales; }
   [[nodiscard]] const PoseSumOptions& options() const { return options_; }
   [[nodiscard]] const filter::OdometryMeasurement& measurement() const { return measurement_; }
+  /// Number of steps of all samples.
+  [[nodiscard]] std::size_t steps() const { return steps_; }
+  /// The last step ...
+  [[nodiscard]] const Step& newest() const { return step_; }
+  /// ... and its g_j for a weight.
+  [[nodiscard]] const Vector& step_weight(std::size_t weight) const { return factors_[weight].g; }
+  /// Largest effective radii and yaw gains of the set.
+  [[nodiscard]] const Vector& largest_radii() const { return radius_; }
+  [[nodiscard]] const Vector& largest_yaw_gains() const { return yaw_gain_; }
   /// What the parameters stand in a sum with, now (p): |SumState::value − (ϑ − ϑ̂)·this| <= SumState::radius.
   [[nodiscard]] Eigen::VectorXd regressor(const SumState& look) const;
   /// V of errors of position, and of heading, of every sum now (weights × scales).
@@ -101,19 +123,12 @@ class PoseSumDetector {
   [[nodiscard]] Eigen::MatrixXd heading_variances() const;
 
  private:
-  using Vector = std::array<double, 2>;  // in the frame of the pose; of sums of headings the first alone
-
   static constexpr std::size_t kSignals = 9;  // E φ̇ of both wheels (4), E (2), φ̇ (2), 1
   static constexpr std::size_t kOrder = 6;    // of the filter that foresees
   using Signals = std::array<double, kSignals>;
   struct Waiting {
     double t = 0.0, h = 0.0;
     Signals signals{};
-  };
-  // A step and what stands in sums for it.
-  struct Step {
-    double begin = 0.0, h = 0.0, turn = 0.0;
-    Vector by{}, mean{}, moved{}, size{};
   };
   // Of one weight, the newest step's and the one's before.
   struct Factors {
@@ -166,6 +181,7 @@ class PoseSumDetector {
   double pose_time_ = 0.0, x_ = 0.0, y_ = 0.0, wrapped_ = 0.0, heading_now_ = 0.0;
   Vector angle_{}, speed_{}, moved_{};
   Step step_{};
+  std::size_t steps_ = 0;
   std::vector<SumState> looks_;
   std::size_t looked_ = 0;
   bool alarm_ = false;

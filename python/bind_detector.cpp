@@ -496,7 +496,8 @@ void bind_margins(py::module_& m) {
       .def_readonly("false_alarms", &commission::RiskMargins::false_alarms, "expected number in a second, at most")
       .def_property_readonly(
           "windows", [](const commission::RiskMargins& r) { return copy(r.windows); }, "s, shape (windows,)")
-      .def_readonly("faults", &commission::RiskMargins::margins, "each fault and side");
+      .def_readonly("faults", &commission::RiskMargins::margins, "each fault and side, in either residual")
+      .def_readonly("pose_faults", &commission::RiskMargins::pose, "those that the pose shows, in it alone");
   py::class_<MarginsObject>(m, "Margins", "Detectability along a drive: which faults are certain to be seen.")
       .def_property_readonly(
           "windows", [](const MarginsObject& o) { return copy(o.survey.windows); }, "s, shape (windows,)")

@@ -272,19 +272,19 @@ Json fault_json(const detector::FaultMargins& margins, const commission::MarginS
   return json;
 }
 
-Json risk_json(const commission::RiskMargins& at_risk) {
+Json risk_faults_json(const std::vector<detector::FaultMargins>& all, const std::vector<double>& windows) {
   Json faults = Json::array();
-  for (const detector::FaultMargins& margins : at_risk.margins) {
+  for (const detector::FaultMargins& margins : all) {
     Json summary = Json::array(), onsets = Json::array();
-    for (std::size_t w = 0; w < at_risk.windows.size(); ++w) {
-      const detector::MarginSummary all = detector::summarise(margins, w);
-      if (all.onsets > 0) {
-        summary.push_back({{"window", at_risk.windows[w]},
-                           {"onsets", all.onsets},
-                           {"certain_at", all.certain},
-                           {"best", or_null(all.best)},
-                           {"median", or_null(all.median)},
-                           {"worst", or_null(all.worst)}});
+    for (std::size_t w = 0; w < windows.size(); ++w) {
+      const detector::MarginSummary at_all = detector::summarise(margins, w);
+      if (at_all.onsets > 0) {
+        summary.push_back({{"window", windows[w]},
+                           {"onsets", at_all.onsets},
+                           {"certain_at", at_all.certain},
+                           {"best", or_null(at_all.best)},
+                           {"median", or_null(at_all.median)},
+                           {"worst", or_null(at_all.worst)}});
       }
     }
     for (const detector::OnsetMargin& onset : margins.onsets) {
@@ -298,11 +298,17 @@ Json risk_json(const commission::RiskMargins& at_risk) {
                       {"summary", std::move(summary)},
                       {"onsets", std::move(onsets)}});
   }
+  return faults;
+}
+
+Json risk_json(const commission::RiskMargins& at_risk) {
   return {{"risk", at_risk.risk},
           {"miss", at_risk.miss},
           {"false_alarms", at_risk.false_alarms},
           {"windows", at_risk.windows},
-          {"faults", std::move(faults)}};
+          {"torque", at_risk.torque},
+          {"faults", risk_faults_json(at_risk.margins, at_risk.windows)},
+          {"pose_faults", risk_faults_json(at_risk.pose, at_risk.windows)}};
 }
 
 }  // namespace

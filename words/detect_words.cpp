@@ -487,10 +487,12 @@ std::array<std::string, 2> how_sure(const commission::MarginSurvey& survey) {
 std::string risk_meaning(const commission::RiskMargins& margins) {
   return fmt::format(
       "“At the stated risk” is meant for all parameters that the set at a risk of {:g} allows, while the errors "
-      "average "
-      "out as the robot file declares: a fault of that size, in a drive whose encoders read like this one, is missed "
-      "with a probability of at most {:.2g}.",
-      margins.risk, margins.miss);
+      "average out as the robot file declares: a fault of that size, in a drive whose encoders read like this one, is "
+      "missed with a probability of at most {:.2g}.{}",
+      margins.risk, margins.miss,
+      margins.pose.empty() ? ""
+                           : " Where the pose shows it, its sums are weighted as in this log: what other errors of the "
+                             "pose make of the weights is not allowed for.");
 }
 
 std::vector<std::string> margin_sentences(const commission::MarginSurvey& survey) {

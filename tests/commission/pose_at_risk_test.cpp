@@ -11,7 +11,10 @@
 #include <gtest/gtest.h>
 
 #include <wheelwright/commission/kinematic.hpp>
+#include <wheelwright/commission/margin_survey.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
+#include <wheelwright/core/limits.hpp>
+#include <wheelwright/detector/pose_margins.hpp>
 #include <wheelwright/model/model.hpp>
 
 #include "support/kinematic_drives.hpp"
@@ -145,6 +148,34 @@ TEST(PoseAtRisk, CommissioningSaysItOfARobotFileThatDeclaresABias) {
   EXPECT_EQ(torque_false_alarms(both) + pose_false_alarms(both), detector::PoseSumOptions{}.false_alarms);
 }
 
+TEST(PoseAtRisk, MarginsSayWhatThePoseShows) {
+  const Scenario s = declared_pose();
+  Simulation log(s);
+  const Commissioning result = commission_robot(log, s.robot);
+  ASSERT_TRUE(result.model.kinematic && result.model.kinematic->at_risk) << testing::PrintToString(result.notes);
+  MarginSurveyOptions options;
+  options.map_points = 0;
+  options.faults = {"unmatched", "effort_loss_right"};
+  const MarginSurvey survey = survey_margins(log, result.model, options);
+  ASSERT_TRUE(survey.at_risk) << survey.without_risk;
+  EXPECT_FALSE(survey.at_risk->torque);
+  EXPECT_EQ(survey.at_risk->risk, result.model.kinematic->at_risk->risk);
+  EXPECT_GE(survey.at_risk->miss, survey.at_risk->risk);
+  const auto within_5_s = [&](const std::vector<detector::FaultMargins>& all, const std::string& fault) {
+    double smallest = core::kInfinity;
+    for (const detector::FaultMargins& each : all) {
+      for (std::size_t w = 0; w < survey.at_risk->windows.size() && each.fault.name == fault; ++w) {
+        smallest =
+            survey.at_risk->windows[w] <= 5.0 ? std::min(smallest, detector::summarise(each, w).median) : smallest;
+      }
+    }
+    return smallest;
+  };
+  EXPECT_LT(within_5_s(survey.at_risk->pose, "unmatched"), 0.05) << "m/s";
+  EXPECT_EQ(within_5_s(survey.at_risk->margins, "unmatched"), within_5_s(survey.at_risk->pose, "unmatched"));
+  EXPECT_EQ(within_5_s(survey.at_risk->margins, "effort_loss_right"), core::kInfinity) << "no pose shows it";
+}
+
 TEST(PoseAtRisk, NothingIsSaidWithoutABias) {
   Scenario s = testing_support::posed_drive(3, 12.0);
   Simulation log(s);
@@ -215,6 +246,52 @@ TEST(SlowPoseAtRisk, SizesSeen) {
       }
       broken.*member = 0.0;
       std::cout << std::endl;
+    }
+  }
+}
+
+// The same of what is certain: the median over onsets, without and with a declared deviation.
+TEST(SlowPoseAtRisk, SizesCertain) {
+  ExactUnicycle healthy;
+  healthy.seconds = 120.0;
+  healthy.law = PoseLaw::uniform;
+  const LogTable log = drive(healthy, 1);
+  const KinematicCommissioning wide = guaranteed(healthy, 1);
+  ASSERT_TRUE(wide.model) << wide.message;
+  const Model robot = model::make_model(robot_of(healthy));
+  const std::vector<model::FaultType> catalogue =
+      model::fault_catalogue(robot, Eigen::VectorXd::Ones(static_cast<Eigen::Index>(robot.p())));
+  std::vector<model::FaultType> faults;
+  for (const char* name : {"matched", "unmatched", "wheel_radius_right", "encoder_scale_right"}) {
+    faults.push_back(model::find_fault(catalogue, name));
+  }
+  detector::SumMarginOptions options;
+  options.windows = {1.0, 5.0, 20.0};
+  std::vector<double> onsets;
+  for (std::size_t k = 2000; k < 9500; k += 500) {
+    onsets.push_back(log.t[k]);
+  }
+  for (const double deviation : {0.0, 1.0 / std::sqrt(3.0)}) {
+    healthy.deviation_share = deviation;
+    detector::KinematicModel model = *wide.model;
+    const PoseAtRisk at_risk = said(healthy, log, model);
+    ASSERT_TRUE(at_risk.model) << at_risk.detail;
+    model.at_risk = at_risk.model;
+    TableSource source(log);
+    const detector::PoseSumDrive seen =
+        detector::read_pose_drive(source, model, detector::PoseSumOptions{}.false_alarms);
+    for (const detector::FaultMargins& each :
+         detector::pose_margins_at_risk(seen, model, robot, faults, onsets, options)) {
+      std::cout << each.fault.name << ", " << each.fault.unit << (each.side > 0.0 ? " +" : " -") << ":";
+      double before = core::kInfinity;
+      for (std::size_t w = 0; w < options.windows.size(); ++w) {
+        const double median = detector::summarise(each, w).median;
+        std::cout << " " << median;
+        EXPECT_LE(median, before);
+        before = median;
+      }
+      std::cout << std::endl;
+      EXPECT_LT(before, 0.01);
     }
   }
 }

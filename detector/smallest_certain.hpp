@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// The smallest certain sizes of one fault among the looks at sums after its onsets.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <wheelwright/core/limits.hpp>
+#include <wheelwright/detector/margins.hpp>
+#include <wheelwright/detector/sum_response.hpp>
+
+namespace wheelwright::detector {
+
+/// `faults`, both sides where their range has two, a fault's sides one after the other, with room for `onsets`.
+[[nodiscard]] std::vector<FaultMargins> sides_of(std::span<const FaultType> faults, std::size_t onsets);
+
+/// The parts of `all` (sides_of(faults)) that are each fault's.
+[[nodiscard]] std::vector<std::span<FaultMargins>> by_fault(std::vector<FaultMargins>& all,
+                                                            std::span<const FaultType> faults);
+
+/// How many of `windows` (ascending) are no longer than `room`.
+[[nodiscard]] std::size_t windows_within(const std::vector<double>& windows, double room);
+
+/// What one look shows of a fault of size κ, about.
+struct SumSighting {
+  double since = 0.0;       ///< s, from the onset to the look
+  double once = 0.0;        ///< what κ moves the look's value by, at the estimate, per κ ...
+  double twice = 0.0;       ///< ... and per κ²
+  double gap = 0.0;         ///< that it has to move by: the set's width and twice the radius
+  std::size_t channel = 0;  ///< of the sum, for ThresholdRule
+};
+
+/// Of each onset and window the look that promises most is kept and solved exactly.
+class SmallestCertain {
+ public:
+  /// `sides` are the fault's; they, and `windows` (s, ascending), are kept by reference.
+  SmallestCertain(std::span<FaultMargins> sides, const std::vector<double>& windows);
+
+  /// A look after onset number `onset`; `row` is asked for where it promises more than those before.
+  void offer(std::size_t onset, const SumSighting& sighting, const std::function<SumRow()>& row);
+  /// Writes OnsetMargin::certain of every side and onset, `fit` of which windows fit.
+  void solve(FaultMargin& margin, const std::function<std::size_t(std::size_t onset)>& fit);
+
+ private:
+  struct Candidate {
+    double size = core::kInfinity;  // about: for the estimate, errors of reading left out
+    std::size_t channel = 0;
+    SumRow row;
+  };
+
+  [[nodiscard]] Candidate& best(std::size_t onset, std::size_t side, std::size_t window) {
+    return best_[(onset * sides_.size() + side) * windows_.size() + window];
+  }
+
+  std::span<FaultMargins> sides_;
+  const std::vector<double>& windows_;
+  std::vector<Candidate> best_;
+};
+
+}  // namespace wheelwright::detector
