@@ -25,11 +25,10 @@ struct Arguments {
 
 constexpr const char* kHelp =
     "Proves the bounds of a model again, from the log that it was made from: filters the log, rebuilds the rows that "
-    "each "
-    "bound names, and verifies their multipliers in exact rational arithmetic. No solver takes part.\n\n"
-    "Checked are the bounds of every parameter (also in physical words), every facet of the feasible set, or, where "
-    "the "
-    "model says that nothing explains the log, that claim. So is what it says at a stated risk: sums over the log are "
+    "each bound names, and verifies their multipliers in exact rational arithmetic. No solver takes part.\n\n"
+    "Checked are the bounds of every parameter (also in physical words), every facet of the feasible set, the same of "
+    "wheel radii and yaw gains, or, where the model says that nothing explains the log, that claim. So is what it says "
+    "at a stated risk: sums over the log are "
     "taken again, facets and bounds are proved from them, and the parts of the risk are added up. What is proved is "
     "arithmetic. Not checked: estimates, standard errors, validation, and whether the noise, the prior and the other "
     "assumptions that the model states are true; they are listed as given, with what commissioning's tests said.";
@@ -46,6 +45,9 @@ int run(const Arguments& a) {
   const auto opened = open_robot_log(a.logs, claims.robot, a.common);
   logs::RecordedLog& log = *opened;
   logs::require_columns(log, claims.measurement.columns());
+  if (claims.kinematic) {
+    logs::require_columns(log, claims.kinematic->model.measurement.columns());
+  }
   const results::ModelCheck check = results::check_model(claims, log, log.report());
   results::CheckedFiles files{a.model.string(), {}};
   for (const std::filesystem::path& path : a.logs) {

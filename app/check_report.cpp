@@ -2,6 +2,7 @@
 #include "check_report.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <set>
 
 #include <fmt/format.h>
@@ -16,12 +17,12 @@ namespace wheelwright::app {
 using namespace words;
 namespace {
 
-const results::PublishedBound& claim_of(const results::BoundVerdict& verdict, const results::ModelClaims& claims) {
+const results::PublishedBound& claim_of(const results::BoundVerdict& verdict, const results::SetClaims& claims) {
   return (verdict.side == bounds::Side::upper ? claims.upper : claims.lower)[verdict.parameter];
 }
 
 /// "rows 5017, 8211 and the prior"; "the prior" where there is no row.
-std::string stands_on(const results::BoundVerdict& verdict, const results::ModelClaims& claims) {
+std::string stands_on(const results::BoundVerdict& verdict, const results::SetClaims& claims) {
   std::vector<std::size_t> rows;
   bool prior = false;
   for (const results::NamedRow& row : claim_of(verdict, claims).proof) {
@@ -55,11 +56,47 @@ std::string stands_on_at_risk(const results::BoundVerdict& verdict, const result
                      guaranteed ? " and the guaranteed set" : "");
 }
 
-std::string statement(const results::BoundVerdict& verdict, const results::ModelClaims& claims) {
-  const model::Parameter& parameter = claims.model.parameters[verdict.parameter];
-  return fmt::format("{} {} {:.7g} {}", parameter.name,
-                     verdict.side == bounds::Side::upper ? "<=" : ">=", verdict.stated,
-                     commission::parameter_unit(claims.robot, parameter));
+/// "sums at 23.4 and 60.1 s and the guaranteed set".
+std::string stands_on_sums(const results::BoundVerdict& verdict, const results::KinematicClaims& claims) {
+  std::vector<std::string> times;
+  bool guaranteed = false;
+  for (const results::NamedRow& row : claim_of(verdict, *claims.at_risk).proof) {
+    const bool sum = !row.origin.is_prior && row.origin.sample >= claims.facets.size();
+    guaranteed = guaranteed || !sum;
+    if (sum) {
+      times.push_back(fmt::format("{:.6g}", row.origin.t));
+    }
+  }
+  return times.empty() ? "the guaranteed set"
+                       : fmt::format("sum{} at {} s{}", times.size() == 1 ? "" : "s", core::enumerated(times),
+                                     guaranteed ? " and the guaranteed set" : "");
+}
+
+// "1" is no unit to be read.
+std::string shown_unit(const std::string& unit) { return unit == "1" ? "" : unit; }
+
+std::vector<std::string> units_of(const results::ModelClaims& claims) {
+  std::vector<std::string> units;
+  for (const model::Parameter& parameter : claims.model.parameters) {
+    units.push_back(commission::parameter_unit(claims.robot, parameter));
+  }
+  return units;
+}
+
+// A line for each bound.
+std::string bound_lines(const std::vector<results::BoundVerdict>& verdicts, const results::SetClaims& claims,
+                        const std::vector<std::string>& units,
+                        const std::function<std::string(const results::BoundVerdict&)>& stands) {
+  constexpr int width = 44;
+  std::string text;
+  for (const results::BoundVerdict& each : verdicts) {
+    const std::string statement =
+        fmt::format("{} {} {:.7g} {}", claims.parameter_names[each.parameter],
+                    each.side == bounds::Side::upper ? "<=" : ">=", each.stated, shown_unit(units[each.parameter]));
+    text +=
+        fmt::format("  {:<{}} {:<10}   {}\n", statement, width, each.proved ? "proved" : "NOT PROVED", stands(each));
+  }
+  return text;
 }
 
 std::string facet_sentence(const results::FacetVerdicts& facets) {
@@ -81,19 +118,26 @@ std::string check_summary(const results::ModelCheck& check, const results::Model
     text += fmt::format("  contradiction of {} rows: {}\n", claims.contradiction.size(),
                         check.emptiness->proved ? "proved" : "NOT PROVED");
   } else {
-    constexpr int width = 44;
-    text += fmt::format("  {:<{}} {:<10}   stands on\n", "bound", width, "");
-    for (const results::BoundVerdict& each : check.bounds) {
-      text += fmt::format("  {:<{}} {:<10}   {}\n", statement(each, claims), width,
-                          each.proved ? "proved" : "NOT PROVED", stands_on(each, claims));
-    }
+    const std::vector<std::string> units = units_of(claims);
+    text += fmt::format("  {:<44} {:<10}   stands on\n", "bound", "");
+    text += bound_lines(check.bounds, claims, units,
+                        [&](const results::BoundVerdict& each) { return stands_on(each, claims); });
     text += "  " + facet_sentence(check.facets) + "\n";
     if (check.at_risk) {
       text += "  " + results::risk_verdict(*check.at_risk, *claims.at_risk) + "\n";
-      for (const results::BoundVerdict& each : check.at_risk->bounds) {
-        text += fmt::format("  {:<{}} {:<10}   {}\n", statement(each, claims), width,
-                            each.proved ? "proved" : "NOT PROVED", stands_on_at_risk(each, *claims.at_risk));
-      }
+      text += bound_lines(check.at_risk->bounds, claims, units,
+                          [&](const results::BoundVerdict& each) { return stands_on_at_risk(each, *claims.at_risk); });
+    }
+  }
+  if (check.kinematic) {
+    const results::KinematicClaims& kinematic = *claims.kinematic;
+    text += "  " + results::kinematic_verdict(*check.kinematic, kinematic) + "\n";
+    text += bound_lines(check.kinematic->bounds, kinematic, kinematic.model.measurement.parameter_units(),
+                        [&](const results::BoundVerdict& each) { return stands_on(each, kinematic); });
+    if (check.pose_at_risk) {
+      text += "  " + results::pose_risk_verdict(*check.pose_at_risk, kinematic) + "\n";
+      text += bound_lines(check.pose_at_risk->bounds, *kinematic.at_risk, kinematic.model.measurement.parameter_units(),
+                          [&](const results::BoundVerdict& each) { return stands_on_sums(each, kinematic); });
     }
   }
   for (std::size_t k = 0; k < std::min(check.failures.size(), most); ++k) {
@@ -118,17 +162,20 @@ std::string check_summary(const results::ModelCheck& check, const results::Model
 std::string check_report(const results::ModelCheck& check, const results::ModelClaims& claims,
                          const results::CheckedFiles& files, const std::string& software) {
   using namespace report;
-  const auto bounds_table = [&](const std::vector<results::BoundVerdict>& verdicts, const auto& origin) {
+  const auto bounds_table = [&](const std::vector<results::BoundVerdict>& verdicts, const results::SetClaims& set,
+                                const std::vector<std::string>& units, const auto& origin) {
     std::vector<std::vector<Cell>> rows;
     for (const results::BoundVerdict& each : verdicts) {
-      const model::Parameter& parameter = claims.model.parameters[each.parameter];
-      rows.push_back({escape(spaced(parameter.name)), each.side == bounds::Side::upper ? "at most" : "at least",
-                      numeric(escape(with_unit(fmt::format("{:.7g}", each.stated),
-                                               commission::parameter_unit(claims.robot, parameter)))),
+      const std::string unit = shown_unit(units[each.parameter]);
+      rows.push_back({escape(spaced(set.parameter_names[each.parameter])),
+                      each.side == bounds::Side::upper ? "at most" : "at least",
+                      numeric(escape(unit.empty() ? fmt::format("{:.7g}", each.stated)
+                                                  : with_unit(fmt::format("{:.7g}", each.stated), unit))),
                       each.proved ? "proved" : "not proved", escape(origin(each))});
     }
     return table({"parameter", "", "bound", "", "stands on"}, rows);
   };
+  const std::vector<std::string> units = units_of(claims);
   PageContent content;
   content.title = "Check of the model of " + claims.robot.name;
   content.status = check.proved() ? (check.warnings.empty() ? "good" : "caution") : "bad";
@@ -139,9 +186,9 @@ std::string check_report(const results::ModelCheck& check, const results::ModelC
       "solver that found them.",
       results::proof_scope(claims)};
   content.warrant = claims.warrant;
-  content.sections = {{"bounds", "Bounds", bounds_table(check.bounds, [&](const results::BoundVerdict& each) {
-                         return stands_on(each, claims);
-                       })}};
+  content.sections = {{"bounds", "Bounds",
+                       bounds_table(check.bounds, claims, units,
+                                    [&](const results::BoundVerdict& each) { return stands_on(each, claims); })}};
   if (!check.emptiness) {
     content.sections.push_back(
         {"facets", "Feasible set", paragraph(escape(core::capital(facet_sentence(check.facets)) + "."))});
@@ -151,7 +198,23 @@ std::string check_report(const results::ModelCheck& check, const results::ModelC
     const auto origin = [&](const results::BoundVerdict& each) { return stands_on_at_risk(each, risk); };
     content.sections.push_back({"at_risk", "At a stated risk",
                                 paragraph(escape(core::capital(results::risk_verdict(*check.at_risk, risk)) + ".")) +
-                                    bounds_table(check.at_risk->bounds, origin)});
+                                    bounds_table(check.at_risk->bounds, claims, units, origin)});
+  }
+  if (check.kinematic) {
+    const results::KinematicClaims& kinematic = *claims.kinematic;
+    content.sections.push_back(
+        {"kinematic", "Wheel radii and yaw gains",
+         paragraph(escape(core::capital(results::kinematic_verdict(*check.kinematic, kinematic)) + ".")) +
+             bounds_table(check.kinematic->bounds, kinematic, kinematic.model.measurement.parameter_units(),
+                          [&](const results::BoundVerdict& each) { return stands_on(each, kinematic); })});
+    if (check.pose_at_risk) {
+      content.sections.push_back(
+          {"pose_at_risk", "Wheel radii and yaw gains at a stated risk",
+           paragraph(escape(core::capital(results::pose_risk_verdict(*check.pose_at_risk, kinematic)) + ".")) +
+               bounds_table(check.pose_at_risk->bounds, *kinematic.at_risk,
+                            kinematic.model.measurement.parameter_units(),
+                            [&](const results::BoundVerdict& each) { return stands_on_sums(each, kinematic); })});
+    }
   }
   if (!check.failures.empty()) {
     content.sections.push_back({"failures", "Not proved", bullets(check.failures)});

@@ -471,6 +471,8 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
   result.raise = bounded.raise;
   result.rows = bounded.set.rows;
   result.parameters = parameters_of(s, *fit, bounded.set.hull);
+  result.lower = bounded.set.lower;
+  result.upper = bounded.set.upper;
   if (bounded.set.status == FeasibleSet::Status::empty) {
     result.status = Status::nothing;
     result.message = message_of(s, result);

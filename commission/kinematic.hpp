@@ -36,6 +36,12 @@ struct KinematicParameter {
   core::Warrant warrant = core::Warrant::extrapolated;  ///< of lower and upper
 };
 
+/// What proves the set at a stated risk (pose_at_risk.hpp).
+struct PoseRiskProof {
+  std::vector<bounds::CertifiedBound> lower, upper;  ///< of each parameter; rows are those of pose_sum_rows()
+  double learning = 0.0;                             ///< share of the log of which V0 is learnt
+};
+
 /// Result of commission_kinematics().
 struct KinematicCommissioning {
   /// What became of it.
@@ -50,6 +56,8 @@ struct KinematicCommissioning {
   std::string message;                            ///< one sentence for people
   std::optional<detector::KinematicModel> model;  ///< where the status gives one
   std::vector<KinematicParameter> parameters;
+  std::vector<bounds::CertifiedBound> lower, upper;  ///< of each of them: the windows that prove it (FeasibleSet)
+  PoseRiskProof at_risk;                             ///< where `model` has something at a stated risk
   std::vector<OutputNoise> noise;            ///< one for each output; a declared bound is the largest of the log's rows
   std::vector<OutputValidation> validation;  ///< on held-out blocks, of a model made from the other blocks
   Box prior;

@@ -5,11 +5,12 @@
 #include <cmath>
 #include <tuple>
 #include <utility>
-#include <variant>
 
 #include <fmt/format.h>
 
+#include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/commission/sum_spread.hpp>
+#include <wheelwright/core/regression.hpp>
 #include <wheelwright/core/statistics.hpp>
 
 namespace wheelwright::commission {
@@ -18,7 +19,7 @@ namespace {
 constexpr double kForesight = 0.2;          // s, at least
 constexpr double kForesightSteps = 6.0;     // from pose to pose, at least
 constexpr double kLeastCuttingScale = 1.0;  // s, of sums that cut the set
-constexpr std::size_t kCutsAtOnce = 256;
+constexpr double kFacetRounding = 1e-12;
 constexpr double kFewestSteps = 2.0;  // in a scale
 
 // The time at which `share` of the time from the first row of `log` to the last is over.
@@ -31,47 +32,60 @@ double time_at(LogSource& log, double share) {
   return first + share * (last - first);
 }
 
-// The set cut by half-spaces, a few hundred at a time.
-class Cutter {
+// Rows |y − Yϑ| <= dy, one after the other.
+class RowTable {
  public:
-  explicit Cutter(const detector::LearntSet& set) : facets_(set.facets), box_(set.box) {}
+  explicit RowTable(const Box& box) : box_(box) {}
 
-  void add(const Eigen::VectorXd& row, double observed, double radius) {
-    const std::span<const double> a{row.data(), static_cast<std::size_t>(row.size())};
-    const Eigen::VectorXd opposite = -row;
-    if (box_.support(a) > observed + radius) {
-      waiting_.push_back({row, observed + radius, {}});
-    }
-    if (box_.support({opposite.data(), a.size()}) > radius - observed) {
-      waiting_.push_back({opposite, radius - observed, {}});
-    }
-    if (waiting_.size() >= kCutsAtOnce) {
-      cut();
-    }
+  // `number` is told as RegressionBlock::sample.
+  void add(std::size_t number, double t, const Eigen::VectorXd& Y, double y, double dy) {
+    numbers_.push_back(number);
+    t_.push_back(t);
+    Y_.insert(Y_.end(), Y.begin(), Y.end());
+    y_.push_back(y);
+    dy_.push_back(dy);
   }
-  void cut() {
-    if (empty_ || waiting_.empty()) {
-      return;
-    }
-    waiting_.insert(waiting_.end(), facets_.begin(), facets_.end());
-    auto set = bounds::Polytope::intersect(waiting_, box_);
-    waiting_.clear();
-    if (std::holds_alternative<bounds::Polytope>(set)) {
-      facets_ = std::get<bounds::Polytope>(set).facets();
-      box_ = std::get<bounds::Polytope>(set).hull();
-    } else {
-      empty_ = true;
-    }
+  // Of the box, in the direction.
+  [[nodiscard]] double support(const Eigen::VectorXd& a) const {
+    return box_.support({a.data(), static_cast<std::size_t>(a.size())});
   }
-  [[nodiscard]] bool empty() const { return empty_; }
-  [[nodiscard]] const std::vector<bounds::HalfSpace>& facets() const { return facets_; }
-  [[nodiscard]] const Box& box() const { return box_; }
+  [[nodiscard]] RegressionBlock block() const {
+    const auto p = static_cast<Eigen::Index>(box_.dimension()), rows = static_cast<Eigen::Index>(t_.size());
+    RegressionBlock block;
+    block.outputs = 1;
+    block.parameters = box_.dimension();
+    block.sample = numbers_;
+    block.t = t_;
+    block.Y = Eigen::Map<const core::RowMatrix>(Y_.data(), rows, p);
+    block.dY = core::RowMatrix::Zero(rows, p);
+    block.y = Eigen::Map<const Eigen::VectorXd>(y_.data(), rows);
+    block.dy = Eigen::Map<const Eigen::VectorXd>(dy_.data(), rows);
+    return block;
+  }
 
  private:
-  std::vector<bounds::HalfSpace> facets_, waiting_;
-  Box box_;
-  bool empty_ = false;
+  const Box& box_;
+  std::vector<std::size_t> numbers_;
+  std::vector<double> t_, Y_, y_, dy_;
 };
+
+// Steps within segments, s.
+double driven(LogSource& log) {
+  double seconds = 0.0, before = 0.0;
+  bool any = false;
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    seconds += any && !starts ? block.t[k] - before : 0.0;
+    before = block.t[k];
+    any = true;
+  });
+  return seconds;
+}
+
+void learn_usual(LogSource& log, detector::KinematicModel& model, double until) {
+  detector::UsualPoseVariances usual = detector::usual_pose_variances(log, model, -core::kInfinity, until);
+  model.at_risk->usual_position = std::move(usual.position);
+  model.at_risk->usual_heading = std::move(usual.heading);
+}
 
 // Half of the test's risk each: a sum too large, and too many large ones.
 void test_on_log(LogSource& log, const detector::KinematicModel& model, double seconds,
@@ -175,55 +189,77 @@ std::optional<detector::PoseErrors> pose_errors(const Robot& robot, double short
   return detector::PoseErrors{error_class(position), error_class(heading), shortest_step};
 }
 
+RegressionBlock pose_sum_rows(LogSource& log, const detector::KinematicModel& guaranteed,
+                              const PoseSumSettings& settings) {
+  detector::KinematicModel model = guaranteed;
+  detector::PoseRiskModel& risk = model.at_risk.emplace();
+  risk.errors = settings.errors;
+  risk.scales = settings.scales;
+  risk.delay = settings.delay;
+  risk.risk = settings.risk;
+  risk.facets = model.facets;
+  risk.box = model.box;
+  RowTable rows(model.box);
+  for (std::size_t k = 0; k < model.facets.size(); ++k) {
+    const Eigen::VectorXd opposite = -model.facets[k].a;
+    const double upper = model.facets[k].b, lower = std::min(upper, -rows.support(opposite));
+    const double half = 0.5 * (upper - lower) * (1.0 + kFacetRounding) + kFacetRounding * std::abs(upper);
+    rows.add(k, 0.0, model.facets[k].a, 0.5 * (upper + lower), half);
+  }
+  const double learnt = time_at(log, settings.learning);
+  learn_usual(log, model, learnt);
+  detector::PoseSumDetector sums(model, {.false_alarms = settings.risk / std::max(driven(log), 1.0)});
+  std::size_t number = model.facets.size();
+  walk_poses(log, sums, learnt, core::kInfinity, [&] {
+    for (const detector::SumState& look : sums.looks()) {
+      if (sums.scales()[look.scale] < kLeastCuttingScale || !std::isfinite(look.radius)) {
+        continue;
+      }
+      const Eigen::VectorXd Y = sums.regressor(look), opposite = -Y;
+      const double y = look.value + Y.dot(model.estimate);
+      if (rows.support(Y) > y + look.radius || rows.support(opposite) > look.radius - y) {
+        rows.add(number, sums.now(), Y, y, look.radius);
+      }
+      ++number;
+    }
+  });
+  return rows.block();
+}
+
 PoseAtRisk pose_at_risk(LogSource& log, const detector::KinematicModel& guaranteed, const detector::PoseErrors& errors,
                         double seconds, const PoseAtRiskOptions& options) {
   PoseAtRisk result;
   const PoseSteps steps = pose_steps(log, guaranteed.measurement);
-  detector::KinematicModel model = guaranteed;
-  detector::PoseRiskModel& risk = model.at_risk.emplace();
-  risk.risk = options.risk;
-  risk.errors = errors;
-  risk.facets = model.facets;
-  risk.box = model.box;
-  std::ranges::copy_if(options.scales, std::back_inserter(risk.scales),
+  PoseSumSettings settings{
+      .errors = errors, .scales = {}, .delay = 0.0, .risk = options.risk, .learning = options.learning};
+  std::ranges::copy_if(options.scales, std::back_inserter(settings.scales),
                        [&](double scale) { return scale >= kFewestSteps * steps.median; });
-  risk.delay = std::max({kForesight, kForesightSteps * steps.median,
-                         0.5 * std::max(errors.position.correlation, errors.heading.correlation)});
-  if (!(steps.shortest > 0.0) || risk.scales.empty()) {
+  settings.delay = std::max({kForesight, kForesightSteps * steps.median,
+                             0.5 * std::max(errors.position.correlation, errors.heading.correlation)});
+  if (!(steps.shortest > 0.0) || settings.scales.empty()) {
     result.detail = "the log has too few poses";
     return result;
   }
-  const auto usual_between = [&](double from, double until) {
-    detector::UsualPoseVariances usual = detector::usual_pose_variances(log, model, from, until);
-    risk.usual_position = std::move(usual.position);
-    risk.usual_heading = std::move(usual.heading);
-  };
-  const double learnt = time_at(log, options.learning);
-  usual_between(-core::kInfinity, learnt);
-  {
-    detector::PoseSumDetector sums(model, {.false_alarms = options.risk / std::max(seconds, 1.0)});
-    Cutter cutter(model);
-    walk_poses(log, sums, learnt, core::kInfinity, [&] {
-      for (const detector::SumState& look : sums.looks()) {
-        if (sums.scales()[look.scale] >= kLeastCuttingScale && std::isfinite(look.radius)) {
-          const Eigen::VectorXd row = sums.regressor(look);
-          cutter.add(row, look.value + row.dot(model.estimate), look.radius);
-        }
-      }
-    });
-    cutter.cut();
-    if (cutter.empty()) {
-      result.verdict = core::AssumptionVerdict::fails;
-      result.detail = "no wheel radii and yaw gains are left";
-      return result;
-    }
-    risk.facets = cutter.facets();
-    risk.box = cutter.box();
+  core::RegressionTable rows(pose_sum_rows(log, guaranteed, settings));
+  FeasibleSet set = feasible_set(rows, guaranteed.box);
+  if (set.status == FeasibleSet::Status::empty) {
+    result.verdict = core::AssumptionVerdict::fails;
+    result.detail = "no wheel radii and yaw gains are left";
+    return result;
   }
-  usual_between(-core::kInfinity, core::kInfinity);
+  detector::KinematicModel model = guaranteed;
+  detector::PoseRiskModel& risk = model.at_risk.emplace();
+  risk.risk = settings.risk;
+  risk.errors = settings.errors;
+  risk.scales = settings.scales;
+  risk.delay = settings.delay;
+  risk.facets = set.polytope->facets();
+  risk.box = set.hull;
+  learn_usual(log, model, core::kInfinity);
   test_on_log(log, model, seconds, options, result);
   if (result.verdict == core::AssumptionVerdict::holds) {
     result.model = std::move(model.at_risk);
+    result.proof = {std::move(set.lower), std::move(set.upper), settings.learning};
   }
   return result;
 }
@@ -254,6 +290,7 @@ void learn_pose_at_risk(LogSource& log, Commissioning& result, const PoseAtRiskO
           said.detail));
     }
     kinematic.model->at_risk = said.model;
+    kinematic.at_risk = std::move(said.proof);
     if (result.model.kinematic) {
       result.model.kinematic->at_risk = std::move(said.model);
     }

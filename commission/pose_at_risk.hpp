@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/core/regression.hpp>
 #include <wheelwright/detector/pose_sums.hpp>
 
 namespace wheelwright::commission {
@@ -27,17 +28,33 @@ struct PoseAtRiskOptions {
 /// `shortest_step`: s, between poses.
 [[nodiscard]] std::optional<detector::PoseErrors> pose_errors(const Robot& robot, double shortest_step);
 
+/// Rows of the sums that cut the set at a risk, one output, with what they stand on.
+struct PoseSumSettings {
+  detector::PoseErrors errors{};
+  std::vector<double> scales{};  ///< s
+  double delay = 0.0;            ///< s, by which weights foresee
+  double risk = 0.0;             ///< of all looks together
+  double learning = 0.0;         ///< share of the log of which V0 is learnt
+};
+
+/// The half-spaces of which the set at a risk is the intersection, as rows |y − Yϑ| <= dy over the box of `model` (the
+/// guaranteed one): first its facets, whose other side is that box, then the sums over scales of 1 s and more at all
+/// looks after the learning, in the order of time, as far as they cut the box; RegressionBlock::sample numbers them,
+/// facets first. The risk is spread over the time driven in `log`. Walks it three times.
+[[nodiscard]] RegressionBlock pose_sum_rows(LogSource& log, const detector::KinematicModel& model,
+                                            const PoseSumSettings& settings);
+
 /// Set, thresholds and verdict.
 struct PoseAtRisk {
   std::optional<detector::PoseRiskModel> model;  ///< where the log does not contradict the assumption
+  PoseRiskProof proof;                           ///< of its set
   core::AssumptionVerdict verdict = core::AssumptionVerdict::not_tested;
   std::string detail;  ///< why there is no model, for people; empty where there is
 };
 
-/// The set of `model` (the guaranteed one) cut by all sums over scales of 1 s and more at all looks
-/// (detector::PoseSumDetector), with all their risks together PoseAtRiskOptions::risk; V0 of later driving; and the
-/// test: the log contradicts the assumption where no parameters are left, where a sum stands outside, or where sums
-/// spread wider than such errors make them, time and again. `seconds`: of the log. Walks it four times.
+/// The set of `model` (the guaranteed one) cut by sums (pose_sum_rows()) with all their risks together
+/// PoseAtRiskOptions::risk; V0 of later driving; and the test: the log contradicts the assumption where no parameters are left, where a sum stands outside, or where sums
+/// spread wider than such errors make them, time and again. `seconds`: of the log.
 [[nodiscard]] PoseAtRisk pose_at_risk(LogSource& log, const detector::KinematicModel& model,
                                       const detector::PoseErrors& errors, double seconds,
                                       const PoseAtRiskOptions& options = {});

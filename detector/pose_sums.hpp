@@ -99,6 +99,8 @@ class PoseSumDetector {
   /// The sums that were looked at with the last sample. Size 1 of SumState::c0 and c1: 1 m/s, 1 rad/s, all of the
   /// parameter.
   [[nodiscard]] std::span<const SumState> looks() const { return {looks_.data(), looked_}; }
+  /// Of the newest sample, s.
+  [[nodiscard]] double now() const { return time_; }
   /// True if one of them is outside.
   [[nodiscard]] bool alarm() const { return alarm_; }
 

@@ -46,9 +46,11 @@ Json noise_json(const commission::KinematicCommissioning& r, const filter::Odome
   return {{"outputs", list}, {"declared_too_small", r.declared_too_small}, {"raise", r.raise}};
 }
 
-Json parameters_json(const commission::KinematicCommissioning& r) {
+Json parameters_json(const commission::KinematicCommissioning& r, const filter::OdometryMeasurement& m) {
+  const auto names = m.parameters(), outputs = m.outputs();
   Json list = Json::array();
-  for (const commission::KinematicParameter& p : r.parameters) {
+  for (std::size_t j = 0; j < r.parameters.size(); ++j) {
+    const commission::KinematicParameter& p = r.parameters[j];
     list.push_back({{"name", p.name},
                     {"unit", p.unit},
                     {"estimate", files::or_null(p.estimate)},
@@ -58,7 +60,10 @@ Json parameters_json(const commission::KinematicCommissioning& r) {
                     {"standard_error", files::or_null(p.standard_error)},
                     {"nominal", p.nominal},
                     {"excitation", files::word_of(kExcitationWords, p.excitation)},
-                    {"reason", p.reason}});
+                    {"reason", p.reason},
+                    {"binding_samples",
+                     {{"lower", proof_json(r.lower[j].binding, names, outputs)},
+                      {"upper", proof_json(r.upper[j].binding, names, outputs)}}}});
   }
   return list;
 }
@@ -83,16 +88,25 @@ Json validation_json(const commission::KinematicCommissioning& r, const filter::
 }
 
 // Facets and hull of a set.
-Json half_spaces_json(const std::vector<bounds::HalfSpace>& facets, const Box& hull) {
-  Json a = Json::array(), b = Json::array();
+Json half_spaces_json(const std::vector<bounds::HalfSpace>& facets, const Box& hull,
+                      const std::vector<std::string>& parameters, const std::vector<std::string>& outputs) {
+  Json a = Json::array(), b = Json::array(), origin = Json::array();
   for (const bounds::HalfSpace& facet : facets) {
     a.push_back(numbers(facet.a));
     b.push_back(facet.b);
+    origin.push_back(origin_json(facet.origin, parameters, outputs));
   }
-  return {{"A", std::move(a)}, {"b", std::move(b)}, {"hull", sides_json(hull)}};
+  return {{"A", std::move(a)}, {"b", std::move(b)}, {"origin", std::move(origin)}, {"hull", sides_json(hull)}};
 }
 
-Json pose_risk_json(const detector::PoseRiskModel& risk) {
+Json pose_risk_json(const detector::PoseRiskModel& risk, const commission::PoseRiskProof& proof,
+                    const std::vector<std::string>& parameters) {
+  const std::vector<std::string> outputs{kPoseSum};
+  Json binding = Json::array();
+  for (std::size_t j = 0; j < proof.lower.size(); ++j) {
+    binding.push_back({{"lower", proof_json(proof.lower[j].binding, parameters, outputs)},
+                       {"upper", proof_json(proof.upper[j].binding, parameters, outputs)}});
+  }
   const auto table = [](const Eigen::MatrixXd& values) {
     Json rows = Json::array();
     for (Eigen::Index w = 0; w < values.rows(); ++w) {
@@ -106,7 +120,9 @@ Json pose_risk_json(const detector::PoseRiskModel& risk) {
            {{"position", error_class_json(risk.errors.position)},
             {"heading", error_class_json(risk.errors.heading)},
             {"shortest_step", risk.errors.shortest_step}}},
-          {"feasible_set", half_spaces_json(risk.facets, risk.box)},
+          {"feasible_set", half_spaces_json(risk.facets, risk.box, parameters, outputs)},
+          {"binding", std::move(binding)},
+          {"learning", proof.learning},
           {"scales", risk.scales},
           {"delay", risk.delay},
           {"usual", {{"position", table(risk.usual_position)}, {"heading", table(risk.usual_heading)}}}};
@@ -128,9 +144,9 @@ std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, 
   json["outputs"] = m.measurement.outputs();
   json["measurement"] = measurement_json(m.measurement);
   json["noise"] = noise_json(r, m.measurement);
-  json["parameters"] = parameters_json(r);
+  json["parameters"] = parameters_json(r, m.measurement);
   json["feasible_set"] = {{"rows", r.rows}, {"prior", sides_json(r.prior)}};
-  json["feasible_set"].update(half_spaces_json(m.facets, m.box));
+  json["feasible_set"].update(half_spaces_json(m.facets, m.box, m.measurement.parameters(), m.measurement.outputs()));
   json["detector"] = {{"estimate", numbers(m.estimate)},
                       {"error_bounds",
                        {{"motion", m.errors.motion},
@@ -142,7 +158,7 @@ std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, 
                       {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
   json["validation"] = validation_json(r, m.measurement, folds, m.window);
   if (m.at_risk) {
-    json["at_risk"] = pose_risk_json(*m.at_risk);
+    json["at_risk"] = pose_risk_json(*m.at_risk, r.at_risk, m.measurement.parameters());
   }
   return json;
 }

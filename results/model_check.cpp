@@ -12,6 +12,7 @@
 #include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/commission/pose_at_risk.hpp>
 #include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/results/model_json.hpp>
 #include <wheelwright/results/risk_check.hpp>
@@ -19,221 +20,10 @@
 namespace wheelwright::results {
 namespace {
 
-/// The instants of the log's regression that the claims name.
-RegressionBlock named_instants(const ModelClaims& claims, LogSource& log) {
-  std::set<std::size_t> wanted;
-  const auto want = [&](const bounds::RowOrigin& origin) {
-    if (!origin.is_prior) {
-      wanted.insert(origin.sample);
-    }
-  };
-  for (const auto* bounds : {&claims.lower, &claims.upper}) {
-    for (const PublishedBound& bound : *bounds) {
-      std::ranges::for_each(bound.proof, [&](const NamedRow& row) { want(row.origin); });
-    }
-  }
-  std::ranges::for_each(claims.contradiction, [&](const NamedRow& row) { want(row.origin); });
-  std::ranges::for_each(claims.facets, [&](const bounds::HalfSpace& facet) { want(facet.origin); });
-
-  RegressionBlock kept, block;
-  kept.resize(wanted.size(), claims.model.n(), claims.model.p());
-  const auto n = static_cast<Eigen::Index>(claims.model.n());
-  std::size_t count = 0;
-  TorqueRows rows(log, RegressorFilter(commission::without_columns(claims.model, claims.left_out), claims.filter,
-                                       claims.measurement, claims.errors));
-  while (rows.next(block)) {
-    for (std::size_t k = 0; k < block.instants(); ++k) {
-      if (wanted.contains(block.sample[k])) {
-        const auto to = static_cast<Eigen::Index>(count) * n, from = static_cast<Eigen::Index>(k) * n;
-        kept.sample[count] = block.sample[k];
-        kept.t[count++] = block.t[k];
-        kept.Y.middleRows(to, n) = block.Y.middleRows(from, n);
-        kept.dY.middleRows(to, n) = block.dY.middleRows(from, n);
-        kept.y.segment(to, n) = block.y.segment(from, n);
-        kept.dy.segment(to, n) = block.dy.segment(from, n);
-      }
-    }
-  }
-  kept.sample.resize(count);  // fewer than the storage holds where a name is no instant of this log
-  kept.t.resize(count);
-  return kept;
-}
-
-/// A side of the prior box.
-bounds::HalfSpace side_of(const Box& prior, const bounds::RowOrigin& origin) {
-  const Interval& side = prior.sides[origin.parameter];
-  const bool is_upper = origin.side == bounds::Side::upper;
-  bounds::HalfSpace row{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(prior.dimension())),
-                        is_upper ? side.upper : -side.lower, origin};
-  row.a[static_cast<Eigen::Index>(origin.parameter)] = is_upper ? 1.0 : -1.0;
-  return row;
-}
-
-/// The rows of the log's regression that the claims of a model name, filtered again with the claimed filter and errors.
-class RebuiltRows {
- public:
-  /// Walks `log` once; keeps the named instants only. `claims` must outlive it. Throws InvalidArgument when the log
-  /// lacks a column.
-  RebuiltRows(const ModelClaims& claims, LogSource& log);
-
-  /// True if a column is noisy and `box` leaves the sign of its parameter open: the rows then depend on the box.
-  [[nodiscard]] bool depends_on(const Box& box) const;
-
-  /// The half-space that holds for every admissible θ of `box` (SlabRows; sides are those of the prior). Nothing where
-  /// this log has no such row, or one at another time, or where it was left out: `why` says which.
-  [[nodiscard]] std::optional<bounds::HalfSpace> row(const bounds::RowOrigin& origin, const Box& box,
-                                                     std::string& why) const;
-
-  /// The rows of a proof, in their order. One that cannot be built takes no part (a multiplier of 0); the first of them
-  /// is told in `why`.
-  [[nodiscard]] std::vector<bounds::WeightedRow> proof(const std::vector<NamedRow>& named, const Box& box,
-                                                       std::string& why) const;
-
- private:
-  const ModelClaims& claims_;
-  RegressionBlock instants_;
-};
-
-RebuiltRows::RebuiltRows(const ModelClaims& claims, LogSource& log)
-    : claims_(claims), instants_(named_instants(claims, log)) {}
-
-bool RebuiltRows::depends_on(const Box& box) const {
-  const bounds::SlabRows slabs(box);
-  for (std::size_t j = 0; j < box.dimension(); ++j) {
-    const auto column = instants_.dY.col(static_cast<Eigen::Index>(j)).head(instants_.rows());
-    if (slabs.sign_is_open(j) && (column.array() > 0.0).any()) {
-      return true;
-    }
-  }
-  return false;
-}
-
-std::optional<bounds::HalfSpace> RebuiltRows::row(const bounds::RowOrigin& origin, const Box& box,
-                                                  std::string& why) const {
-  if (origin.is_prior) {
-    return side_of(claims_.prior, origin);
-  }
-  if (std::ranges::find(claims_.dropped, origin.sample) != claims_.dropped.end()) {
-    why = fmt::format("row {} is one of those that were left out as outliers", origin.sample);
-    return std::nullopt;
-  }
-  const auto it = std::ranges::lower_bound(instants_.sample, origin.sample);
-  if (it == instants_.sample.end() || *it != origin.sample) {
-    why = fmt::format("row {} is no instant of the regression of this log", origin.sample);
-    return std::nullopt;
-  }
-  const auto k = static_cast<std::size_t>(it - instants_.sample.begin());
-  if (instants_.t[k] != origin.t) {
-    why = fmt::format("row {} is at t = {} s in this log, not at {} s", origin.sample, instants_.t[k], origin.t);
-    return std::nullopt;
-  }
-  bounds::HalfSpace upper, lower;
-  const auto row = static_cast<Eigen::Index>(k * instants_.outputs + origin.output);
-  bounds::SlabRows(box).half_spaces(instants_, row, upper, lower);
-  return origin.side == bounds::Side::upper ? upper : lower;
-}
-
-std::vector<bounds::WeightedRow> RebuiltRows::proof(const std::vector<NamedRow>& named, const Box& box,
-                                                    std::string& why) const {
-  std::vector<bounds::WeightedRow> rows;
-  for (const NamedRow& name : named) {
-    std::string missing;
-    if (auto half_space = row(name.origin, box, missing)) {
-      rows.push_back({*std::move(half_space), name.multiplier});
-    } else {
-      rows.push_back({{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(box.dimension())), 0.0, {}}, 0.0});
-      why = why.empty() ? missing : why;
-    }
-  }
-  return rows;
-}
-
-/// The bounds proved, the boxes over which rows were built, and what could not be built.
-struct Proof {
-  bounds::HullCheck hull;
-  std::vector<Box> boxes;  // the prior, and those proved on the way
-  std::vector<std::string> missing_lower, missing_upper;
-};
-
-/// Claims over the prior; where rows depend on signs that this proves, again over what was proved.
-Proof prove_bounds(const ModelClaims& claims, const RebuiltRows& rebuilt) {
-  const std::size_t p = claims.model.p();
-  Proof proof;
-  Box box = claims.prior;
-  while (true) {
-    proof.boxes.push_back(box);
-    std::vector<bounds::BoundClaim> lower, upper;
-    proof.missing_lower.assign(p, {});
-    proof.missing_upper.assign(p, {});
-    for (std::size_t j = 0; j < p; ++j) {
-      lower.push_back({claims.lower[j].value, rebuilt.proof(claims.lower[j].proof, box, proof.missing_lower[j])});
-      upper.push_back({claims.upper[j].value, rebuilt.proof(claims.upper[j].proof, box, proof.missing_upper[j])});
-    }
-    proof.hull = bounds::check_hull(lower, upper, box);
-    if (proof.hull.contradiction || proof.hull.all_proved() || proof.hull.proved == box || !rebuilt.depends_on(box) ||
-        proof.boxes.size() > 8) {
-      return proof;
-    }
-    box = proof.hull.proved;
-  }
-}
-
-std::string sign_parts_remark(const ModelClaims& claims) {
-  return claims.sign_parts > 1 ? fmt::format(
-                                     "; the set is a union of {} parts, one for each pattern of open signs, and "
-                                     "a model file proves the bounds of one part only",
-                                     claims.sign_parts)
-                               : std::string();
-}
-
-/// Why a proof is none, with the names of rows and parameters.
-std::string explain(const bounds::CertificateCheck& check, const std::string& missing,
-                    const std::vector<NamedRow>& proof, const ModelClaims& claims) {
-  if (!missing.empty()) {
-    return missing;
-  }
-  const auto name = [&](std::size_t row) { return name_of(proof[row].origin, claims.model); };
-  return shortcoming(check, name, claims.model) + sign_parts_remark(claims);
-}
-
-void judge_bounds(const ModelClaims& claims, const Proof& proof, ModelCheck& result) {
-  for (std::size_t j = 0; j < claims.model.p(); ++j) {
-    for (const bounds::Side side : {bounds::Side::lower, bounds::Side::upper}) {
-      const bool is_upper = side == bounds::Side::upper;
-      const PublishedBound& claim = (is_upper ? claims.upper : claims.lower)[j];
-      const bounds::CertificateCheck& check = (is_upper ? proof.hull.upper : proof.hull.lower)[j];
-      const std::string& missing = (is_upper ? proof.missing_upper : proof.missing_lower)[j];
-      BoundVerdict verdict{j, side, claim.value, is_upper ? check.bound : -check.bound, check.proved, check.shortfall,
-                           {}};
-      if (!check.proved || !missing.empty()) {
-        verdict.proved = false;
-        verdict.reason = explain(check, missing, claim.proof, claims);
-        result.failures.push_back(fmt::format("{} {} {} is not proved: {}", claims.model.parameters[j].name,
-                                              is_upper ? "<=" : ">=", claim.value, verdict.reason));
-      }
-      result.bounds.push_back(std::move(verdict));
-    }
-  }
-  if (proof.hull.contradiction) {
-    result.failures.push_back(
-        "the rows that are to prove the bounds contradict each other: they prove that no parameters explain the log, "
-        "and the model says that some do");
-  }
-}
-
-void judge_hull(const ModelClaims& claims, const Proof& proof, ModelCheck& result) {
+void judge_physical(const ModelClaims& claims, ModelCheck& result) {
   const auto scales = commission::physical_scales(claims.robot, claims.model);
   for (std::size_t j = 0; j < claims.model.p(); ++j) {
-    const Interval& proved = proof.hull.proved.sides[j];
-    const Interval& hull = claims.hull.sides[j];
     const model::Parameter& parameter = claims.model.parameters[j];
-    // A hull that is the stated bounds was judged with them.
-    const bool other = hull.lower != claims.lower[j].value || hull.upper != claims.upper[j].value;
-    if (other && !(hull.lower <= proved.lower && proved.upper <= hull.upper)) {
-      result.failures.push_back(
-          fmt::format("feasible_set.hull of {}, [{}, {}], does not contain what is proved, [{}, {}]", parameter.name,
-                      hull.lower, hull.upper, proved.lower, proved.upper));
-    }
     if (const auto stated = claims.physical.find(parameter.physical); stated != claims.physical.end() && scales) {
       const commission::PhysicalScale& s = (*scales)[j];
       const Interval exact = Interval{s.scale, s.scale} * Interval{claims.lower[j].value, claims.upper[j].value} -
@@ -244,61 +34,6 @@ void judge_hull(const ModelClaims& claims, const Proof& proof, ModelCheck& resul
                         parameter.physical, stated->second.lower, stated->second.upper, exact.lower, exact.upper));
       }
     }
-  }
-}
-
-/// Whether the facet is the row that it names or follows from it; otherwise a sentence.
-std::string judge_facet(const bounds::HalfSpace& facet, const RebuiltRows& rebuilt, const Proof& proof,
-                        const ModelClaims& claims, FacetVerdicts& verdicts) {
-  const std::span<const double> a(facet.a.data(), static_cast<std::size_t>(facet.a.size()));
-  const Box& within = proof.hull.contradiction ? claims.prior : proof.hull.proved;
-  std::string why;
-  for (const Box& box : proof.boxes) {
-    std::string missing;
-    const auto row = rebuilt.row(facet.origin, box, missing);
-    if (!row) {
-      return missing;
-    }
-    const bool same = row->a == facet.a;
-    if (same && row->b <= facet.b) {
-      ++(facet.origin.is_prior ? verdicts.sides : verdicts.rows);
-      return {};
-    }
-    const std::vector<bounds::WeightedRow> alone{{*row, 1.0}};
-    const bounds::CertificateCheck check = bounds::check_bound(a, alone, within, facet.b);
-    if (check.proved) {
-      ++verdicts.implied;
-      return {};
-    }
-    why = same ? fmt::format("its b is inward of {} by {:.3g}", name_of(facet.origin, claims.model), row->b - facet.b)
-               : fmt::format("its coefficients are not those of {}, from which it does not follow by {:.3g}",
-                             name_of(facet.origin, claims.model), check.shortfall);
-  }
-  return why + sign_parts_remark(claims);
-}
-
-/// Says of each facet whether it is proved.
-std::vector<bool> judge_facets(const ModelClaims& claims, const RebuiltRows& rebuilt, const Proof& proof,
-                               ModelCheck& result) {
-  std::vector<bool> proved(claims.facets.size(), true);
-  for (std::size_t k = 0; k < claims.facets.size(); ++k) {
-    if (const std::string why = judge_facet(claims.facets[k], rebuilt, proof, claims, result.facets); !why.empty()) {
-      result.facets.wrong.push_back(fmt::format("row {} of feasible_set.A is not proved: {}", k, why));
-      proved[k] = false;
-    }
-  }
-  result.failures.insert(result.failures.end(), result.facets.wrong.begin(), result.facets.wrong.end());
-  return proved;
-}
-
-void judge_emptiness(const ModelClaims& claims, const RebuiltRows& rebuilt, ModelCheck& result) {
-  std::string missing;
-  const std::vector<bounds::WeightedRow> rows = rebuilt.proof(claims.contradiction, claims.prior, missing);
-  result.emptiness = bounds::check_emptiness(rows, claims.prior);
-  if (!result.emptiness->proved || !missing.empty()) {
-    result.emptiness->proved = false;
-    result.failures.push_back("that no parameters explain the log is not proved: " +
-                              explain(*result.emptiness, missing, claims.contradiction, claims));
   }
 }
 
@@ -366,6 +101,119 @@ void judge_detector(const ModelClaims& claims, ModelCheck& result) {
   judge("heading", Eigen::VectorXd::Constant(1, watched.heading), Eigen::VectorXd::Constant(1, proved.heading));
 }
 
+SetCheck check_kinematic(const KinematicClaims& claims, const Robot& robot, LogSource& log) {
+  const detector::KinematicModel& model = claims.model;
+  filter::OdometryRows rows(log, filter::OdometryFilter(model.measurement, model.window, claims.errors));
+  SetCheck result = check_set(claims, rows);
+  const auto declared = [&](const char* key, double stated, const model::NoiseBound& noise, bool taken) {
+    if (taken && noise.value && stated < *noise.value) {
+      result.failures.push_back(
+          fmt::format("kinematic.detector.error_bounds.{} is {}: expected at least {}, as the robot has it", key,
+                      stated, *noise.value));
+    }
+  };
+  for (std::size_t i = 0; i < claims.origin.size(); ++i) {
+    const bool taken = claims.origin[i] == core::NoiseOrigin::declared, yaw = claims.output_names[i] == "yaw";
+    declared("heading", claims.errors.heading, robot.noise.heading, taken && yaw);
+    declared("position", claims.errors.position, robot.noise.position, taken && !yaw);
+  }
+  for (Eigen::Index i = 0; i < model.errors.estimated.size(); ++i) {
+    if (model.errors.estimated[i] < claims.errors.estimated[i]) {
+      result.failures.push_back(
+          fmt::format("kinematic.detector.error_bounds.estimated[{}] is {}: expected at least {}, the noise that the "
+                      "bounds are proved with",
+                      i, model.errors.estimated[i], claims.errors.estimated[i]));
+    }
+  }
+  return result;
+}
+
+// Whether the errors at a risk are no smaller than the robot's, and poses no closer than they take it.
+void judge_pose_errors(const detector::PoseErrors& claimed, const Robot& robot, double shortest_step,
+                       std::vector<std::string>& failures) {
+  const std::optional<detector::PoseErrors> declared = commission::pose_errors(robot, shortest_step);
+  if (!declared || !declared->average()) {
+    failures.emplace_back("kinematic.at_risk: the robot file declares no errors of the pose that average out");
+    return;
+  }
+  const auto compare = [&](const std::string& key, double stated, double least) {
+    if (!(stated >= least)) {
+      failures.push_back(fmt::format("kinematic.at_risk.errors.{} is {}: expected at least {}, as the robot has it",
+                                     key, stated, least));
+    }
+  };
+  const auto compare_class = [&](const std::string& key, const filter::ErrorClass& stated,
+                                 const filter::ErrorClass& least) {
+    compare(key + ".bound", stated.bound, least.bound);
+    compare(key + ".bias", stated.bias, least.bias);
+    compare(key + ".correlation", stated.correlation, least.correlation);
+    compare(key + ".deviation", stated.deviation, least.deviation);
+  };
+  compare_class("position", claimed.position, declared->position);
+  compare_class("heading", claimed.heading, declared->heading);
+  if (claimed.shortest_step > shortest_step) {
+    failures.push_back(fmt::format("kinematic.at_risk.errors.shortest_step is {}, and poses of the log are {} s apart",
+                                   claimed.shortest_step, shortest_step));
+  }
+}
+
+// `guaranteed` is what became of the set that it is a part of.
+SetCheck check_pose_at_risk(const KinematicClaims& claims, const SetCheck& guaranteed, const Robot& robot,
+                            LogSource& log) {
+  constexpr double kRounding = 5e-11;  // half of what a radius allows for that of the sums
+  const detector::PoseRiskModel& risk = *claims.model.at_risk;
+  detector::KinematicModel wide = claims.model;
+  wide.facets = claims.facets;
+  wide.box = claims.hull;
+  SetCheck result;
+  try {
+    RegressionBlock rows = commission::pose_sum_rows(log, wide,
+                                                     {.errors = risk.errors,
+                                                      .scales = risk.scales,
+                                                      .delay = risk.delay,
+                                                      .risk = risk.risk,
+                                                      .learning = claims.learning});
+    for (std::size_t k = 0; k < rows.instants(); ++k) {
+      rows.dy[static_cast<Eigen::Index>(k)] *= rows.sample[k] < claims.facets.size() ? 1.0 : 1.0 - kRounding;
+    }
+    core::RegressionTable table(std::move(rows));
+    result = check_set(*claims.at_risk, table);
+  } catch (const InvalidArgument& error) {
+    result.failures.push_back(fmt::format("kinematic.at_risk: no sums can be taken: {}", error.what()));
+  }
+  judge_pose_errors(risk.errors, robot, commission::pose_steps(log, claims.model.measurement).shortest,
+                    result.failures);
+  if (!guaranteed.failures.empty()) {
+    result.failures.emplace_back("the set of kinematic.at_risk stands on kinematic.feasible_set, which is not proved");
+  }
+  return result;
+}
+
+void tell_kinematic_premises(const KinematicClaims& claims, std::vector<std::string>& premises) {
+  const auto estimated = std::ranges::count(claims.origin, core::NoiseOrigin::estimated);
+  premises.push_back(fmt::format(
+      "of wheel radii and yaw gains: their prior, the window of {:g} s, the errors of pose, gyro and wheels ({}) and "
+      "the "
+      "wheels' largest acceleration between samples that the model states; how windows of odometry are made, which "
+      "commissioning and this check have in common",
+      claims.model.window,
+      estimated == 0 ? "declared"
+      : estimated == static_cast<std::ptrdiff_t>(claims.origin.size())
+          ? "estimated from the residuals of this log"
+          : "declared, and some estimated from the residuals"));
+  if (claims.at_risk) {
+    premises.push_back(fmt::format(
+        "of the pose at a risk of {:g}: that its errors are as the robot file says and of no larger mean; the "
+        "inequality "
+        "for their sums (docs/risk.md); that scales, the delay, and the part of the log on which V0 is learnt were "
+        "chosen without this log; and how the sums are made, which commissioning and this check have in common",
+        claims.model.at_risk->risk));
+  } else if (claims.model.at_risk) {
+    premises.emplace_back(
+        "not checked: what is said of the pose at a stated risk, whose proofs this model was written without");
+  }
+}
+
 void tell_premises(const ModelClaims& claims, ModelCheck& result) {
   result.premises.push_back(
       "the prior box, the filter, the measurement and the errors of the motion that the model states");
@@ -393,6 +241,13 @@ void tell_premises(const ModelClaims& claims, ModelCheck& result) {
         claims.at_risk->model.risk,
         estimated ? "they were estimated from the log, in all driving to come," : "the robot file says"));
   }
+  if (claims.kinematic) {
+    tell_kinematic_premises(*claims.kinematic, result.premises);
+  } else if (claims.unproved_kinematic) {
+    result.premises.emplace_back(
+        "not checked: the bounds of wheel radii and yaw gains, whose proofs this model was written without; commission "
+        "again to have one that can be checked");
+  }
   if (!claims.dropped.empty()) {
     result.premises.push_back(
         fmt::format("that the instants left out as outliers (rows {}) are the wrong ones: this cannot be checked",
@@ -402,49 +257,38 @@ void tell_premises(const ModelClaims& claims, ModelCheck& result) {
 
 }  // namespace
 
-std::string name_of(const bounds::RowOrigin& origin, const Model& model) {
-  const char* side = origin.side == bounds::Side::upper ? "upper" : "lower";
-  return origin.is_prior
-             ? fmt::format("the prior's {} bound of {}", side, model.parameters[origin.parameter].name)
-             : fmt::format("row {} (t = {} s, {}, {})", origin.sample, origin.t, model.outputs[origin.output], side);
-}
-
-std::string shortcoming(const bounds::CertificateCheck& check, const std::function<std::string(std::size_t)>& row_name,
-                        const Model& model) {
-  if (!std::isfinite(check.shortfall)) {
-    return check.row ? fmt::format("{} ({})", check.reason, row_name(*check.row)) : check.reason;
-  }
-  std::string text = fmt::format("what the certificate proves falls short of it by {:.3g}", check.shortfall);
-  if (check.row) {
-    text += "; it proves more without " + row_name(*check.row);
-  }
-  if (check.parameter) {
-    text += fmt::format("; most is left over in {}", model.parameters[*check.parameter].name);
-  }
-  return text;
-}
-
 ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::LogReport& data) {
   ModelCheck result;
   judge_log(claims, data, result);
   judge_prior(claims, result);
   judge_detector(claims, result);
-  const RebuiltRows rebuilt(claims, log);
-  const Proof proof = prove_bounds(claims, rebuilt);
-  judge_bounds(claims, proof, result);
+  TorqueRows rows(log, RegressorFilter(commission::without_columns(claims.model, claims.left_out), claims.filter,
+                                       claims.measurement, claims.errors));
+  SetCheck set = check_set(claims, rows);
+  result.bounds = std::move(set.bounds);
+  result.emptiness = std::move(set.emptiness);
+  result.facets = std::move(set.facets);
+  const auto add = [&](const std::vector<std::string>& failures) {
+    result.failures.insert(result.failures.end(), failures.begin(), failures.end());
+  };
+  add(set.failures);
   if (claims.set == FeasibleSet::Status::empty) {
-    judge_emptiness(claims, rebuilt, result);
     if (claims.at_risk) {
       result.failures.emplace_back("a set at a stated risk is a part of the guaranteed one, which is said to be empty");
     }
-  } else {
-    if (!proof.hull.contradiction) {
-      judge_hull(claims, proof, result);
+  } else if (!set.contradiction) {
+    judge_physical(claims, result);
+    if (claims.at_risk) {
+      result.at_risk = check_at_risk(claims, *claims.at_risk, log, set.proved, set.facet_proved);
+      add(result.at_risk->failures);
     }
-    const std::vector<bool> facets = judge_facets(claims, rebuilt, proof, result);
-    if (claims.at_risk && !proof.hull.contradiction) {
-      result.at_risk = check_at_risk(claims, *claims.at_risk, log, proof.hull.proved, facets);
-      result.failures.insert(result.failures.end(), result.at_risk->failures.begin(), result.at_risk->failures.end());
+  }
+  if (claims.kinematic) {
+    result.kinematic = check_kinematic(*claims.kinematic, claims.robot, log);
+    add(result.kinematic->failures);
+    if (claims.kinematic->at_risk) {
+      result.pose_at_risk = check_pose_at_risk(*claims.kinematic, *result.kinematic, claims.robot, log);
+      add(result.pose_at_risk->failures);
     }
   }
   tell_premises(claims, result);
@@ -476,6 +320,29 @@ std::string verdict(const ModelCheck& check, const ModelClaims& claims) {
                      check.bounds.size(), claims.facets.size());
 }
 
+std::string kinematic_verdict(const SetCheck& check, const KinematicClaims& claims) {
+  if (!check.failures.empty()) {
+    return fmt::format("wheel radii and yaw gains: not proved, {} statement{} not follow from the log",
+                       check.failures.size(), check.failures.size() == 1 ? " does" : "s do");
+  }
+  return fmt::format(
+      "wheel radii and yaw gains: all {} bounds and {} facets follow from the windows of odometry that they name ({})",
+      check.bounds.size(), claims.facets.size(), core::warrant_word(claims.model.warrant));
+}
+
+std::string pose_risk_verdict(const SetCheck& check, const KinematicClaims& claims) {
+  const double risk = claims.model.at_risk->risk;
+  if (!check.failures.empty()) {
+    return fmt::format("of the pose at a risk of {:g}: not proved, {} statement{} not follow from the log", risk,
+                       check.failures.size(), check.failures.size() == 1 ? " does" : "s do");
+  }
+  return fmt::format(
+      "of the pose at a risk of {:g}: all {} bounds and {} facets follow from the guaranteed set and from sums over "
+      "the "
+      "log, at all of which together that risk is run",
+      risk, check.bounds.size(), claims.at_risk->facets.size());
+}
+
 std::string risk_verdict(const RiskCheck& check, const RiskClaims& claims) {
   if (!check.failures.empty()) {
     return fmt::format("at a risk of {:g}: not proved, {} statement{} not follow from the log", claims.model.risk,
@@ -491,10 +358,9 @@ std::string risk_verdict(const RiskCheck& check, const RiskClaims& claims) {
 
 namespace {
 
-Json bound_json(const BoundVerdict& verdict, const ModelClaims& claims, std::size_t rows) {
-  const model::Parameter& parameter = claims.model.parameters[verdict.parameter];
-  return {{"parameter", parameter.name},
-          {"unit", commission::parameter_unit(claims.robot, parameter)},
+Json bound_json(const BoundVerdict& verdict, const std::string& parameter, const std::string& unit, std::size_t rows) {
+  return {{"parameter", parameter},
+          {"unit", unit},
           {"side", files::word_of(kSideWords, verdict.side)},
           {"stated", verdict.stated},
           {"shown", files::or_null(verdict.shown)},
@@ -502,6 +368,38 @@ Json bound_json(const BoundVerdict& verdict, const ModelClaims& claims, std::siz
           {"shortfall", files::or_null(verdict.shortfall)},
           {"rows", rows},
           {"reason", verdict.reason}};
+}
+
+Json bound_json(const BoundVerdict& verdict, const ModelClaims& claims, std::size_t rows) {
+  const model::Parameter& parameter = claims.model.parameters[verdict.parameter];
+  return bound_json(verdict, parameter.name, commission::parameter_unit(claims.robot, parameter), rows);
+}
+
+std::size_t proof_size(const SetClaims& claims, const BoundVerdict& verdict) {
+  return (verdict.side == bounds::Side::upper ? claims.upper : claims.lower)[verdict.parameter].proof.size();
+}
+
+Json facets_json(const FacetVerdicts& facets, const SetClaims& claims) {
+  return {{"stated", claims.facets.size()},
+          {"rows", facets.rows},
+          {"sides", facets.sides},
+          {"implied", facets.implied},
+          {"wrong", facets.wrong.size()}};
+}
+
+Json kinematic_json(const SetCheck& check, const SetClaims& claims, const detector::KinematicModel& model,
+                    const std::string& message, core::Warrant warrant) {
+  const std::vector<std::string> units = model.measurement.parameter_units();
+  Json bounds = Json::array();
+  for (const BoundVerdict& each : check.bounds) {
+    bounds.push_back(
+        bound_json(each, claims.parameter_names[each.parameter], units[each.parameter], proof_size(claims, each)));
+  }
+  return {{"proved", check.failures.empty()},
+          {"message", message},
+          {"warrant", core::warrant_word(warrant)},
+          {"facets", facets_json(check.facets, claims)},
+          {"bounds", std::move(bounds)}};
 }
 
 Json risk_json(const RiskCheck& check, const ModelClaims& claims) {
@@ -530,10 +428,8 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::Log
     log_files.push_back({{"path", file.path}, {"hash", file.hash}, {"bytes", file.bytes}, {"rows", file.rows}});
   }
   for (const BoundVerdict& each : check.bounds) {
-    const auto& stated = each.side == bounds::Side::upper ? claims.upper : claims.lower;
-    bounds.push_back(bound_json(each, claims, stated[each.parameter].proof.size()));
+    bounds.push_back(bound_json(each, claims, proof_size(claims, each)));
   }
-  const FacetVerdicts& facets = check.facets;
   Json json = {
       {"schema", "wheelwright/check/1"},
       {"software", software},
@@ -544,18 +440,23 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::Log
       {"scope", proof_scope(claims)},
       {"data", {{"same", check.same_log}, {"rows", data.rows}, {"segments", data.segments}, {"files", log_files}}},
       {"bounds", bounds},
-      {"facets",
-       {{"stated", claims.facets.size()},
-        {"rows", facets.rows},
-        {"sides", facets.sides},
-        {"implied", facets.implied},
-        {"wrong", facets.wrong.size()}}},
+      {"facets", facets_json(check.facets, claims)},
       {"failures", check.failures},
       {"warnings", check.warnings},
       {"premises", check.premises},
       {"assumptions", assumptions_json(claims.assumptions)}};
   if (check.at_risk) {
     json["at_risk"] = risk_json(*check.at_risk, claims);
+  }
+  if (check.kinematic) {
+    const KinematicClaims& kinematic = *claims.kinematic;
+    json["kinematic"] = kinematic_json(*check.kinematic, kinematic, kinematic.model,
+                                       kinematic_verdict(*check.kinematic, kinematic), kinematic.model.warrant);
+    if (check.pose_at_risk) {
+      json["pose_at_risk"] =
+          kinematic_json(*check.pose_at_risk, *kinematic.at_risk, kinematic.model,
+                         pose_risk_verdict(*check.pose_at_risk, kinematic), kinematic.model.at_risk->warrant);
+    }
   }
   if (check.emptiness) {
     json["contradiction"] = {{"rows", claims.contradiction.size()},

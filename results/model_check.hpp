@@ -4,36 +4,16 @@
 /// exact arithmetic; check.json has the verdict and its scope.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <wheelwright/bounds/check_certificate.hpp>
 #include <wheelwright/core/log.hpp>
 #include <wheelwright/files/json.hpp>
 #include <wheelwright/results/model_file.hpp>
+#include <wheelwright/results/set_check.hpp>
 
 namespace wheelwright::results {
-
-/// A published bound and what became of it.
-struct BoundVerdict {
-  std::size_t parameter = 0;
-  bounds::Side side = bounds::Side::upper;
-  double stated = 0.0;
-  double shown = 0.0;  ///< the bound that is proved, rounded outward; ±∞ where none is
-  bool proved = false;
-  double shortfall = 0.0;  ///< CertificateCheck::shortfall
-  std::string reason;      ///< why it is not proved; empty where it is
-};
-
-/// Verdicts on the rows of `feasible_set`.
-struct FacetVerdicts {
-  std::size_t rows = 0;            ///< the log's row that they name, coefficient by coefficient, b not smaller
-  std::size_t sides = 0;           ///< the side of the prior box that they name, b not smaller
-  std::size_t implied = 0;         ///< other numbers, which follow from the row that they name and the proved bounds
-  std::vector<std::string> wrong;  ///< the others, a sentence each
-};
 
 /// What became of the claims at a stated risk (RiskClaims).
 struct RiskCheck {
@@ -49,11 +29,13 @@ struct ModelCheck {
   std::vector<BoundVerdict> bounds;                   ///< lower and upper bound of each parameter
   std::optional<bounds::CertificateCheck> emptiness;  ///< where the model says that no θ explains the log
   FacetVerdicts facets;
-  std::optional<RiskCheck> at_risk;   ///< where the model says something at a stated risk and has bounds
-  bool same_log = false;              ///< same bytes, file by file
-  std::vector<std::string> failures;  ///< everything that is not proved, a sentence each
-  std::vector<std::string> warnings;  ///< what is worth knowing and contradicts no proof
-  std::vector<std::string> premises;  ///< what the proofs stand on and do not prove
+  std::optional<RiskCheck> at_risk;      ///< where the model says something at a stated risk and has bounds
+  std::optional<SetCheck> kinematic;     ///< where the model has a kinematic residual with proofs
+  std::optional<SetCheck> pose_at_risk;  ///< where that has a set at a stated risk with proofs
+  bool same_log = false;                 ///< same bytes, file by file
+  std::vector<std::string> failures;     ///< everything that is not proved, a sentence each
+  std::vector<std::string> warnings;     ///< what is worth knowing and contradicts no proof
+  std::vector<std::string> premises;     ///< what the proofs stand on and do not prove
 
   /// True if everything is proved.
   [[nodiscard]] bool proved() const { return failures.empty(); }
@@ -63,16 +45,10 @@ struct ModelCheck {
 /// row that it names, or follows from it; that each published bound is proved by the rows that it names; that the hull
 /// and the physical intervals contain the proved bounds; or, where the set is said to be empty, that it is. `data` says
 /// which files the log is. Rows of columns with noise whose sign the prior leaves open are rebuilt over the box that
-/// they prove. What it says at a stated risk is left to check_at_risk(). Throws InvalidArgument when the log lacks a
-/// column.
+/// they prove. The same of wheel radii and yaw gains (ModelClaims::kinematic), whose windows of odometry, and sums of
+/// the pose (commission::pose_sum_rows()), are made again.
+/// What it says at a stated risk is left to check_at_risk(). Throws InvalidArgument when the log lacks a column.
 [[nodiscard]] ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::LogReport& data);
-
-/// "row 5017 (t = 50.17 s, sum, upper)", or "the prior's lower bound of r_mass".
-[[nodiscard]] std::string name_of(const bounds::RowOrigin& origin, const Model& model);
-
-/// Why `check` does not prove its bound, in words; `row_name` names the rows of the certificate.
-[[nodiscard]] std::string shortcoming(const bounds::CertificateCheck& check,
-                                      const std::function<std::string(std::size_t)>& row_name, const Model& model);
 
 /// The files of a check, as they were named.
 struct CheckedFiles {
@@ -85,6 +61,12 @@ struct CheckedFiles {
 
 /// The answer in one sentence.
 [[nodiscard]] std::string verdict(const ModelCheck& check, const ModelClaims& claims);
+
+/// What is proved of wheel radii and yaw gains, in one sentence.
+[[nodiscard]] std::string kinematic_verdict(const SetCheck& check, const KinematicClaims& claims);
+
+/// What is proved of them at a stated risk, in one sentence.
+[[nodiscard]] std::string pose_risk_verdict(const SetCheck& check, const KinematicClaims& claims);
 
 /// What is proved at a stated risk, in one sentence.
 [[nodiscard]] std::string risk_verdict(const RiskCheck& check, const RiskClaims& claims);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/results/model_file.hpp>
 
+#include <algorithm>
+#include <limits>
+
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/core/limits.hpp>
@@ -14,42 +17,33 @@ using files::JsonPlace;
 
 namespace {
 
-/// Position in `list` of an entry whose name (`name_of`) is the text at `place`.
-template <typename List, typename NameOf>
-std::size_t position(const List& list, NameOf name_of, const JsonPlace& place) {
-  const std::string name = place.text();
-  for (std::size_t k = 0; k < list.size(); ++k) {
-    if (name_of(list[k]) == name) {
-      return k;
-    }
+// Position of the text at `place` in `names`.
+std::size_t place_of(const JsonPlace& place, const std::vector<std::string>& names) {
+  const auto found = std::ranges::find(names, place.text());
+  if (found == names.end()) {
+    place.fail("a name of the robot's model");
   }
-  place.fail("a name of the robot's model");
+  return static_cast<std::size_t>(found - names.begin());
 }
 
-std::size_t parameter_at(const JsonPlace& place, const Model& model) {
-  return position(
-      model.parameters, [](const model::Parameter& p) { return p.name; }, place);
-}
-
-bounds::RowOrigin read_origin(const JsonPlace& place, const Model& model) {
+bounds::RowOrigin read_origin(const JsonPlace& place, const SetClaims& claims) {
   bounds::RowOrigin origin;
   origin.side = files::value_of(kSideWords, place.at("side"));
   origin.is_prior = place.has("prior");
   if (origin.is_prior) {
-    origin.parameter = parameter_at(place.at("prior"), model);
+    origin.parameter = place_of(place.at("prior"), claims.parameter_names);
   } else {
     origin.sample = place.at("row").count();
     origin.t = place.at("t").number();
-    origin.output = position(
-        model.outputs, [](const std::string& o) { return o; }, place.at("output"));
+    origin.output = place_of(place.at("output"), claims.output_names);
   }
   return origin;
 }
 
-std::vector<NamedRow> read_proof(const JsonPlace& place, const Model& model) {
+std::vector<NamedRow> read_proof(const JsonPlace& place, const SetClaims& claims) {
   std::vector<NamedRow> rows;
   for (std::size_t k = 0; k < place.size(); ++k) {
-    rows.push_back({read_origin(place.at(k), model), place.at(k).at("multiplier").number()});
+    rows.push_back({read_origin(place.at(k), claims), place.at(k).at("multiplier").number()});
   }
   return rows;
 }
@@ -80,22 +74,36 @@ void read_noise(const JsonPlace& noise, ModelClaims& claims) {
       names.fail("no such member where noise is declared");
     }
     for (std::size_t k = 0; k < names.size(); ++k) {
-      claims.left_out[parameter_at(names.at(k), claims.model)] = true;
+      claims.left_out[place_of(names.at(k), claims.parameter_names)] = true;
     }
   }
 }
 
-void read_parameters(const JsonPlace& place, ModelClaims& claims) {
-  if (place.size() != claims.model.p()) {
-    place.fail("one entry for each of the " + std::to_string(claims.model.p()) + " parameters");
+void read_parameters(const JsonPlace& place, SetClaims& claims) {
+  if (place.size() != claims.parameter_names.size()) {
+    place.fail("one entry for each of the " + std::to_string(claims.parameter_names.size()) + " parameters");
   }
   for (std::size_t j = 0; j < place.size(); ++j) {
     const JsonPlace parameter = place.at(j), samples = parameter.at("binding_samples");
-    if (parameter.at("name").text() != claims.model.parameters[j].name) {
-      parameter.at("name").fail(claims.model.parameters[j].name + ", as the robot's model has it");
+    if (parameter.at("name").text() != claims.parameter_names[j]) {
+      parameter.at("name").fail(claims.parameter_names[j] + ", as the robot's model has it");
     }
-    claims.lower.push_back({parameter.at("lower").number(), read_proof(samples.at("lower"), claims.model)});
-    claims.upper.push_back({parameter.at("upper").number(), read_proof(samples.at("upper"), claims.model)});
+    claims.lower.push_back({parameter.at("lower").number(), read_proof(samples.at("lower"), claims)});
+    claims.upper.push_back({parameter.at("upper").number(), read_proof(samples.at("upper"), claims)});
+  }
+}
+
+// Facets and hull.
+void read_half_spaces(const JsonPlace& place, SetClaims& claims) {
+  const std::size_t p = claims.parameter_names.size();
+  claims.hull = robots::box_at(place.at("hull"), p);
+  claims.facets = robots::facets_at(place, p);
+  const JsonPlace origin = place.at("origin");
+  if (origin.size() != claims.facets.size()) {
+    origin.fail("one entry for each of the " + std::to_string(claims.facets.size()) + " rows of A");
+  }
+  for (std::size_t k = 0; k < origin.size(); ++k) {
+    claims.facets[k].origin = read_origin(origin.at(k), claims);
   }
 }
 
@@ -113,18 +121,60 @@ void read_set(const JsonPlace& place, ModelClaims& claims) {
   }
   if (status == "empty") {
     claims.set = FeasibleSet::Status::empty;
-    claims.contradiction = read_proof(place.at("contradiction"), claims.model);
+    claims.contradiction = read_proof(place.at("contradiction"), claims);
     claims.hull = claims.prior;
     return;
   }
-  claims.hull = robots::box_at(place.at("hull"), p);
-  claims.facets = robots::facets_at(place, p);
-  const JsonPlace origin = place.at("origin");
-  if (origin.size() != claims.facets.size()) {
-    origin.fail("one entry for each of the " + std::to_string(claims.facets.size()) + " rows of A");
+  read_half_spaces(place, claims);
+}
+
+void read_kinematic(const JsonPlace& place, const detector::KinematicModel& model, ModelClaims& all) {
+  const JsonPlace set = place.at("feasible_set"), outputs = place.at("noise").at("outputs");
+  if (!set.has("origin")) {
+    all.unproved_kinematic = true;
+    return;
   }
-  for (std::size_t k = 0; k < origin.size(); ++k) {
-    claims.facets[k].origin = read_origin(origin.at(k), claims.model);
+  KinematicClaims& claims = all.kinematic.emplace();
+  claims.key = "kinematic.feasible_set";
+  claims.parameter_names = model.measurement.parameters();
+  claims.output_names = model.measurement.outputs();
+  claims.model = model;
+  claims.errors = model.errors;
+  if (outputs.size() != claims.output_names.size()) {
+    outputs.fail("one entry for each of the " + std::to_string(claims.output_names.size()) + " outputs");
+  }
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    claims.origin.push_back(files::value_of(robots::kNoiseOriginWords, outputs.at(i).at("origin")));
+    if (claims.origin.back() == core::NoiseOrigin::estimated) {
+      const JsonPlace learning = outputs.at(i).at("learning");
+      if (!(learning.number() >= 0.0) || claims.errors.estimated.size() == 0) {
+        learning.fail("a bound >= 0, and detector.error_bounds.estimated");
+      }
+      claims.errors.estimated[static_cast<Eigen::Index>(i)] =
+          std::max(learning.number(), std::numeric_limits<double>::min());
+    }
+  }
+  claims.prior = robots::box_at(set.at("prior"), claims.parameter_names.size());
+  read_half_spaces(set, claims);
+  read_parameters(place.at("parameters"), claims);
+  if (!place.has("at_risk") || !place.at("at_risk").has("binding")) {
+    return;
+  }
+  const JsonPlace at_risk = place.at("at_risk"), binding = at_risk.at("binding");
+  SetClaims& narrower = claims.at_risk.emplace();
+  narrower.key = "kinematic.at_risk.feasible_set";
+  narrower.parameter_names = claims.parameter_names;
+  narrower.output_names = {kPoseSum};
+  narrower.prior = claims.hull;
+  read_half_spaces(at_risk.at("feasible_set"), narrower);
+  claims.learning = at_risk.at("learning").number();
+  if (binding.size() != narrower.parameter_names.size()) {
+    binding.fail("one entry for each of the " + std::to_string(narrower.parameter_names.size()) + " parameters");
+  }
+  for (std::size_t j = 0; j < binding.size(); ++j) {
+    const Interval& side = narrower.hull.sides[j];
+    narrower.lower.push_back({side.lower, read_proof(binding.at(j).at("lower"), narrower)});
+    narrower.upper.push_back({side.upper, read_proof(binding.at(j).at("upper"), narrower)});
   }
 }
 
@@ -145,7 +195,7 @@ commission::RiskOrigin read_risk_origin(const JsonPlace& place, const ModelClaim
   }
   const bounds::Side side = files::value_of(kSideWords, place.at("side"));
   if (place.has("box")) {
-    return {Kind::box, parameter_at(place.at("box"), claims.model), side};
+    return {Kind::box, place_of(place.at("box"), claims.parameter_names), side};
   }
   return {Kind::sum, number_at(place.at("sum"), claims.at_risk->sums.size(), "at_risk.sums"), side};
 }
@@ -158,7 +208,7 @@ std::vector<NamedRiskRow> read_risk_proof(const JsonPlace& place, const ModelCla
   return rows;
 }
 
-commission::RiskEllipsoid read_ellipsoid(const JsonPlace& place, const Model& model) {
+commission::RiskEllipsoid read_ellipsoid(const JsonPlace& place, const ModelClaims& claims) {
   // A radius that is not finite bounds nothing.
   const auto number = [&](const char* key) { return place.has(key) ? place.at(key).number() : core::kInfinity; };
   commission::RiskEllipsoid ellipsoid{.delay = place.at("delay").number(),
@@ -168,7 +218,7 @@ commission::RiskEllipsoid read_ellipsoid(const JsonPlace& place, const Model& mo
                                       .squared_radius = number("squared_radius")};
   const JsonPlace names = place.at("parameters");
   for (std::size_t k = 0; k < names.size(); ++k) {
-    ellipsoid.parameters.push_back(parameter_at(names.at(k), model));
+    ellipsoid.parameters.push_back(place_of(names.at(k), claims.parameter_names));
   }
   return ellipsoid;
 }
@@ -207,7 +257,7 @@ void read_risk(const JsonPlace& place, ModelClaims& claims) {
   risk.box = robots::box_at(set.at("box"), p);
   risk.learning = place.at("learning").number();
   for (std::size_t k = 0; k < ellipsoids.size(); ++k) {
-    risk.ellipsoids.push_back(read_ellipsoid(ellipsoids.at(k), claims.model));
+    risk.ellipsoids.push_back(read_ellipsoid(ellipsoids.at(k), claims));
   }
   for (std::size_t k = 0; k < sums.size(); ++k) {
     risk.sums.push_back(read_sum(sums.at(k), claims));
@@ -272,11 +322,18 @@ void read_data(const JsonPlace& place, ModelClaims& claims) {
 ModelClaims claims_from_json(const Json& json, const std::string& file) {
   const JsonPlace root = robots::model_root(json, file);
   ModelClaims claims;
+  std::optional<OnlineModel> online;
   if (root.has("detector")) {
-    claims.detector_errors = robots::model_from_json(json, file).errors;  // what detectors refuse is not proved
+    online = robots::model_from_json(json, file);  // what detectors refuse is not proved
+    claims.detector_errors = online->errors;
   }
   claims.robot = robots::robot_from_json(root.at("robot").value(), root.at("robot").where());
   claims.model = model::make_model(claims.robot);
+  claims.key = "feasible_set";
+  claims.output_names = claims.model.outputs;
+  for (const model::Parameter& parameter : claims.model.parameters) {
+    claims.parameter_names.push_back(parameter.name);
+  }
   claims.filter = robots::filter_at(root.at("filter"));
   claims.measurement = robots::measurement_at(root.at("measurement"), claims.model, claims.robot);
   read_noise(root.at("noise"), claims);
@@ -294,6 +351,9 @@ ModelClaims claims_from_json(const Json& json, const std::string& file) {
     read_risk(root.at("at_risk"), claims);
   }
   read_published_at_risk(root, claims);
+  if (online && online->kinematic) {
+    read_kinematic(root.at("kinematic"), *online->kinematic, claims);
+  }
   read_data(root.at("data"), claims);
   return claims;
 }

@@ -50,9 +50,32 @@ struct RiskClaims {
   std::map<std::string, Interval> parameters, physical;  ///< intervals as they are published, by name
 };
 
+/// Claims about a feasible set.
+struct SetClaims {
+  std::string key;  ///< that the model file has it under, for messages: "feasible_set"
+  std::vector<std::string> parameter_names, output_names;
+  Box prior;  ///< in which the set was sought
+  FeasibleSet::Status set = FeasibleSet::Status::nonempty;
+  std::vector<PublishedBound> lower, upper;  ///< of each parameter
+  std::vector<NamedRow> contradiction;       ///< where the set is empty
+  std::vector<bounds::HalfSpace> facets;     ///< of the set, with their origins; else none
+  Box hull;                                  ///< of the set; the prior where it is empty
+  std::vector<std::size_t> dropped;          ///< rows left out as outliers
+  std::size_t sign_parts = 1;                ///< FeasibleSet::sign_parts
+};
+
+/// Claims about wheel radii and yaw gains.
+struct KinematicClaims : SetClaims {
+  detector::KinematicModel model;
+  filter::OdometryErrors errors;          ///< of the rows of the log
+  std::vector<core::NoiseOrigin> origin;  ///< one for each output
+  std::optional<SetClaims> at_risk;       ///< the set at a stated risk, where it has one with proofs
+  double learning = 0.0;                  ///< of that: share of the log of which V0 is learnt
+};
+
 /// Claims of a model.json about θ, and all that is needed to prove them again from the log; `wheelwright check`
 /// verifies them.
-struct ModelClaims {
+struct ModelClaims : SetClaims {
   Robot robot;
   Model model;
   Measurement measurement;
@@ -60,22 +83,16 @@ struct ModelClaims {
   filter::SignalErrors errors;                          ///< of the rows of the log: Commissioning::row_errors
   std::vector<core::NoiseOrigin> origin;                ///< of errors.output, one for each output
   std::optional<filter::SignalErrors> detector_errors;  ///< of driving to come; none without a model
-  Box prior;                                            ///< in which the set was sought
-  FeasibleSet::Status set = FeasibleSet::Status::nonempty;
-  std::vector<PublishedBound> lower, upper;             ///< of each parameter
-  std::vector<NamedRow> contradiction;                  ///< where the set is empty
-  std::vector<bounds::HalfSpace> facets;                ///< of the set, with their origins; else none
-  Box hull;                                             ///< of the set; the prior where it is empty
   std::map<std::string, Interval> physical;             ///< bounds by physical name; none where there is no scale
   std::vector<bool> left_out;                           ///< p: parameters whose columns the rows of the set lack
-  std::vector<std::size_t> dropped;                     ///< rows left out as outliers
-  std::size_t sign_parts = 1;                           ///< FeasibleSet::sign_parts
   std::vector<logs::LogFileReport> files;               ///< path, hash, bytes and rows of each file of the log
   std::size_t rows = 0;                                 ///< of the log
   std::size_t segments = 0;                             ///< of the log
   core::Warrant warrant = core::Warrant::extrapolated;  ///< of the bounds, as the model states it
   std::vector<core::Assumption> assumptions;            ///< that it took; none of a model from before it listed them
   std::optional<RiskClaims> at_risk;                    ///< what it says at a stated risk
+  std::optional<KinematicClaims> kinematic;             ///< of the kinematic residual, where it has one with proofs
+  bool unproved_kinematic = false;                      ///< it has one without: it was written before there were any
 };
 
 /// Reads the claims of a model.json, also of one that holds no model. Throws InputError, naming file and key, when it

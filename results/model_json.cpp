@@ -57,31 +57,48 @@ Json error_classes_json(const filter::ErrorClasses& classes) {
           {"shortest_step", classes.shortest_step}};
 }
 
-namespace {
-
-constexpr std::size_t kMostVertices = 256;
-
-Json origin_json(const bounds::RowOrigin& origin, const Model& model) {
+Json origin_json(const bounds::RowOrigin& origin, const std::vector<std::string>& parameters,
+                 const std::vector<std::string>& outputs) {
   if (origin.is_prior) {
-    return {{"prior", model.parameters[origin.parameter].name}, {"side", word_of(kSideWords, origin.side)}};
+    return {{"prior", parameters[origin.parameter]}, {"side", word_of(kSideWords, origin.side)}};
   }
   return {{"row", origin.sample},
           {"t", origin.t},
-          {"output", model.outputs[origin.output]},
+          {"output", outputs[origin.output]},
           {"side", word_of(kSideWords, origin.side)}};
 }
 
-// The rows that prove a bound with their multipliers; the check needs no more.
-Json proof_json(const std::vector<bounds::WeightedRow>& rows, const Model& model) {
+Json proof_json(const std::vector<bounds::WeightedRow>& rows, const std::vector<std::string>& parameters,
+                const std::vector<std::string>& outputs) {
   Json list = Json::array();
   for (const bounds::WeightedRow& weighted : rows) {
     if (weighted.multiplier > 0.0) {
-      Json row = origin_json(weighted.row.origin, model);
+      Json row = origin_json(weighted.row.origin, parameters, outputs);
       row["multiplier"] = weighted.multiplier;
       list.push_back(row);
     }
   }
   return list;
+}
+
+namespace {
+
+constexpr std::size_t kMostVertices = 256;
+
+std::vector<std::string> parameter_names(const Model& model) {
+  std::vector<std::string> names;
+  for (const model::Parameter& parameter : model.parameters) {
+    names.push_back(parameter.name);
+  }
+  return names;
+}
+
+Json origin_json(const bounds::RowOrigin& origin, const Model& model) {
+  return results::origin_json(origin, parameter_names(model), model.outputs);
+}
+
+Json proof_json(const std::vector<bounds::WeightedRow>& rows, const Model& model) {
+  return results::proof_json(rows, parameter_names(model), model.outputs);
 }
 
 // What bounds motion and efforts between samples; null where the rows do not hold it.

@@ -33,6 +33,17 @@ inline constexpr files::Words<bounds::Side, 2> kSideWords{
 /// The list as results have it under `assumptions`.
 [[nodiscard]] Json assumptions_json(const std::vector<core::Assumption>& assumptions);
 
+/// What kinematic.at_risk calls the one output of its rows (commission::pose_sum_rows()).
+inline constexpr const char* kPoseSum = "pose";
+
+/// Where a half-space comes from; names of parameters and outputs.
+[[nodiscard]] Json origin_json(const bounds::RowOrigin& origin, const std::vector<std::string>& parameters,
+                               const std::vector<std::string>& outputs);
+
+/// The rows that prove a bound with their multipliers; the check needs no more.
+[[nodiscard]] Json proof_json(const std::vector<bounds::WeightedRow>& rows, const std::vector<std::string>& parameters,
+                              const std::vector<std::string>& outputs);
+
 /// Lower and upper end of each side.
 [[nodiscard]] Json sides_json(const Box& box);
 

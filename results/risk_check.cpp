@@ -280,7 +280,7 @@ bounds::HullCheck judge_bounds(const Case& c, RiskCheck& result) {
                            .reason = {}};
       if (!check.proved) {
         const auto name = [&](std::size_t row) { return label(proof[row].origin, c); };
-        verdict.reason = shortcoming(check, name, c.claims.model);
+        verdict.reason = shortcoming(check, name, c.claims);
         result.failures.push_back(fmt::format("{} {} {} is not proved: {}", c.parameter(j),
                                               is_upper ? "<=" : ">=", verdict.stated, verdict.reason));
       }

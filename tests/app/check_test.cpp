@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // wheelwright check: what was commissioned is proved; whatever is changed in the model or the log is found and named.
+#include <algorithm>
 #include <cmath>
 #include <functional>
+
+#include <wheelwright/core/words.hpp>
 
 #include "app/program.hpp"
 
@@ -101,6 +104,114 @@ TEST_F(Check, ABoundMovedInwardIsRefusedOneMovedOutwardIsNot) {
     m["physical"]["mass"]["lower"] = 0.0;
   });
   EXPECT_EQ(outward.code, 0) << outward.out;
+}
+
+/// A model with a kinematic residual, at a stated risk too.
+class CheckPose : public Check {
+ protected:
+  void commission_posed() {
+    std::string robot = bytes(examples() / "robot.yaml"), scenario = bytes(examples() / "scenarios" / "healthy.yaml");
+    core::replace_all(robot, "position: 0.002, heading: 0.003",
+                      "position: {bound: 0.002, bias: 0.0001}, heading: {bound: 0.003, bias: 0.0001}");
+    core::replace_all(scenario, "../robot.yaml", "robot.yaml");
+    core::replace_all(scenario, "duration: 60", "duration: 40");
+    put("robot.yaml", robot);
+    put("drive.yaml", scenario);
+    ASSERT_EQ(run("simulate drive.yaml --out drive.csv").code, 0);
+    const Outcome outcome = run("commission drive.csv --robot robot.yaml --out model");
+    ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+  }
+  std::string failures(const std::function<void(Json&)>& change) const {
+    Json model = read_json(path("model/model.json"));
+    change(model.at("kinematic"));
+    files::write_json(path("changed.json"), model);
+    const Outcome outcome = run("check changed.json drive.csv --json");
+    EXPECT_EQ(outcome.code, 1) << outcome.err;
+    return Json::parse(outcome.out).at("failures").dump();
+  }
+};
+
+TEST_F(CheckPose, WheelRadiiAndYawGainsAreProvedToo) {
+  commission_posed();
+  const Outcome outcome = run("check model/model.json drive.csv --out result");
+  EXPECT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("wheel radii and yaw gains: all 8 bounds"), HasSubstr("radius_right >= "),
+                                 HasSubstr("of the pose at a risk of 1e-09: all 8 bounds"), Not(HasSubstr("NOT"))));
+  const std::string page = bytes(path("result/report.html"));
+  EXPECT_TRUE(page.find("Wheel radii and yaw gains: all 8 bounds") != std::string::npos);
+  EXPECT_TRUE(page.find("Of the pose at a risk of 1e-09: all 8 bounds") != std::string::npos);
+  const Json result = read_json(path("result/check.json")), model = read_json(path("model/model.json"));
+  for (const char* part : {"kinematic", "pose_at_risk"}) {
+    EXPECT_TRUE(result.at(part).at("proved").get<bool>());
+    EXPECT_EQ(result.at(part).at("bounds").size(), 8U);
+    EXPECT_EQ(result.at(part).at("facets").at("wrong"), 0);
+  }
+  for (std::size_t j = 0; j < 4; ++j) {
+    const Json& p = model.at("kinematic").at("parameters").at(j);
+    const double lower = p.at("lower").get<double>(), upper = p.at("upper").get<double>();
+    const double step = 1e-9 * (upper - lower);
+    const std::string name = p.at("name").get<std::string>();
+    EXPECT_THAT(failures([&](Json& k) { k["parameters"][j]["lower"] = lower + step; }), HasSubstr(name + " >= "));
+    EXPECT_THAT(failures([&](Json& k) { k["parameters"][j]["upper"] = upper - step; }), HasSubstr(name + " <= "));
+    EXPECT_THAT(failures([&](Json& k) { k["feasible_set"]["hull"][j][1] = upper - step; }),
+                HasSubstr("kinematic.feasible_set.hull of " + name));
+    EXPECT_THAT(failures([&](Json& k) {
+                  Json& end = k["at_risk"]["feasible_set"]["hull"][j][0];
+                  end = end.get<double>() + step;
+                }),
+                HasSubstr(name + " >= "));
+  }
+}
+
+TEST_F(CheckPose, AFacetThatIsNotWhatItNamesIsRefused) {
+  commission_posed();
+  for (const char* part : {"", "at_risk"}) {
+    const auto set = [&](Json& k) -> Json& { return (*part == 0 ? k : k[part])["feasible_set"]; };
+    Json kinematic = read_json(path("model/model.json")).at("kinematic");
+    const Json& origin = set(kinematic).at("origin");
+    const auto first = static_cast<std::size_t>(
+        std::ranges::find_if(origin, [](const Json& each) { return each.contains("row"); }) - origin.begin());
+    ASSERT_LT(first, origin.size());
+    const std::string name =
+        fmt::format("row {} of kinematic.{}feasible_set.A is not proved", first, *part == 0 ? "" : "at_risk.");
+    EXPECT_THAT(failures([&](Json& k) { set(k)["b"][first] = set(k)["b"][first].get<double>() - 1e-7; }),
+                HasSubstr(name));
+    EXPECT_THAT(failures([&](Json& k) {
+                  Json& row = set(k)["origin"][first]["row"];
+                  row = row.get<int>() + 1;
+                }),
+                HasSubstr(name));
+  }
+}
+
+TEST_F(CheckPose, SmallerErrorsThanTheRobotsAreRefused) {
+  commission_posed();
+  EXPECT_THAT(failures([](Json& k) { k["detector"]["error_bounds"]["heading"] = 1e-4; }),
+              HasSubstr("error_bounds.heading is 0.0001: expected at least 0.003, as the robot has it"));
+  EXPECT_THAT(failures([](Json& k) { k["at_risk"]["errors"]["position"]["bias"] = 0.0; }),
+              HasSubstr("kinematic.at_risk.errors.position.bias is 0: expected at least 0.0001, as the robot has it"));
+  EXPECT_THAT(failures([](Json& k) { k["at_risk"]["errors"]["shortest_step"] = 0.1; }),
+              HasSubstr("shortest_step is 0.1"));
+  EXPECT_THAT(failures([](Json& k) { k["at_risk"]["risk"] = 1e-15; }), HasSubstr("kinematic.at_risk.feasible_set.A"));
+}
+
+TEST_F(CheckPose, AnOlderModelIsSaidNotToBeChecked) {
+  commission_posed();
+  Json model = read_json(path("model/model.json"));
+  Json& kinematic = model.at("kinematic");
+  kinematic["at_risk"].erase("binding");
+  files::write_json(path("changed.json"), model);
+  const Outcome partly = run("check changed.json drive.csv");
+  EXPECT_EQ(partly.code, 0) << partly.out << partly.err;
+  EXPECT_THAT(partly.out, HasSubstr("not checked: what is said of the pose at a stated risk"));
+  kinematic["feasible_set"].erase("origin");
+  for (Json& parameter : kinematic["parameters"]) {
+    parameter.erase("binding_samples");
+  }
+  files::write_json(path("changed.json"), model);
+  const Outcome outcome = run("check changed.json drive.csv");
+  EXPECT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("not checked: the bounds of wheel radii and yaw gains"));
 }
 
 TEST_F(Check, AnotherCertificateIsNone) {
