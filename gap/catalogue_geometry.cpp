@@ -96,12 +96,13 @@ Effect slope() {
               },
           .physical =
               [](std::span<const double> c, Shape) {
-                // The model's mass holds 2J/r² of the wheels and rotors, on which no gravity acts.
-                constexpr double kMostOfWheels = 0.25;
+                // The model's mass holds 2J/r² of the wheels and rotors, on which no gravity acts: this share at most.
+                constexpr double kMostOfWheels = 0.3;
                 return std::vector<PhysicalValue>{
                     {"g_x", "m/s²", c[0]},
                     {"g_y", "m/s²", c[1]},
-                    {"angle_rad", "rad", std::asin(std::min(1.0, std::hypot(c[0], c[1]) / kGravity)), kMostOfWheels},
+                    {"angle_rad", "rad", std::asin(std::min(1.0, std::hypot(c[0], c[1]) / kGravity)),
+                     kMostOfWheels / (1.0 - kMostOfWheels)},
                     {"uphill_heading_rad", "rad", std::atan2(c[1], c[0])}};
               }};
 }
