@@ -413,15 +413,17 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   where_to_look.beta = prepared.row_options.beta;
   where_to_look.seed = options.seed;
   result.where = locate_gap(prepared.drive, result.series, where_to_look);
-  std::vector<double> floors(prepared.floor.efforts.data(),
-                             prepared.floor.efforts.data() + prepared.floor.efforts.size());
-  const Contradictions contradictions = find_contradictions(
-      prepared.drive, prepared.row_options.beta,
-      settled(prepared.drive, prepared.row_options.beta) && moving(prepared.drive, prepared.row_options.beta), floors,
-      finite_prior(seen, prepared));
   if (result.verdict != GapVerdict::no_gap) {
+    const std::vector<double> floors(prepared.floor.efforts.data(),
+                                     prepared.floor.efforts.data() + prepared.floor.efforts.size());
+    const Contradictions contradictions = find_contradictions(
+        prepared.drive, prepared.row_options.beta,
+        settled(prepared.drive, prepared.row_options.beta) && moving(prepared.drive, prepared.row_options.beta), floors,
+        finite_prior(seen, prepared));
     result.contradictions = contradictions.rows;
-    result.notes.push_back(contradictions.statement);
+    if (!contradictions.rows.empty()) {
+      result.notes.push_back(contradictions.statement);
+    }
   }
   const BaseModel alike = trusted ? BaseModel::nominal : BaseModel::refitted;
   const std::vector<std::optional<Signature>> on_log = signatures(problem.table, alike);

@@ -325,9 +325,9 @@ Contradictions find_contradictions(const Drive& drive, double beta, const Mask& 
   }
   std::stable_sort(out.rows.begin(), out.rows.end(),
                    [](const Contradiction& a, const Contradiction& b) { return a.weight > b.weight; });
-  out.statement =
-      fmt::format("No parameters of the model explain every row {}: {} contradict each other.", within,
-                  out.rows.size() == 1 ? "one row and the prior bounds" : fmt::format("{} rows", out.rows.size()));
+  out.statement = fmt::format(
+      "Without an effect beside the model no parameters explain every row {}: {} contradict each other.", within,
+      out.rows.size() == 1 ? "one row and the prior bounds" : fmt::format("{} rows", out.rows.size()));
   return out;
 }
 
