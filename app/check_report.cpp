@@ -173,7 +173,7 @@ std::string check_report(const results::ModelCheck& check, const results::ModelC
                                                   : with_unit(fmt::format("{:.7g}", each.stated), unit))),
                       each.proved ? "proved" : "not proved", escape(origin(each))});
     }
-    return table({"parameter", "", "bound", "", "stands on"}, rows);
+    return table({"parameter", "", numeric("bound"), "", "stands on"}, rows);
   };
   const std::vector<std::string> units = units_of(claims);
   PageContent content;

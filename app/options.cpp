@@ -53,7 +53,9 @@ void add_map(CLI::App& command, CommonOptions& options) {
            .add_option(
                "--map", options.map,
                "Read the log column NAME from the file's column COLUMN, or from a bag's TOPIC.FIELD (repeatable), e.g. "
-               "--map omega_r=wheel_2 or --map omega_r=/joint_states.velocity[right_wheel]")
+               "--map omega_r=wheel_2 or --map omega_r=/joint_states.velocity[right_wheel]; COLUMN*FACTOR multiplies, "
+               "for other "
+               "units (rpm: *0.10472)")
            ->type_name("NAME=COLUMN"));
   repeatable(*command
                   .add_option("--msg-path", options.msg_path,

@@ -27,6 +27,7 @@ class PoseResponse {
         p_(static_cast<Eigen::Index>(model.measurement.parameters().size())),
         gains_(model.measurement.position ? 2 : 0),
         s_(kParameters + (signature_.rolled.isZero(0.0) ? 0 : p_)),
+        stationary_(fault.profile.kind == FaultProfile::Kind::step),
         signals_(Eigen::ArrayXXd::Zero(static_cast<Eigen::Index>(drive.weights.size()),
                                        s_ + (signature_.shown.isZero(0.0) ? 0 : p_))) {}
 
@@ -34,27 +35,50 @@ class PoseResponse {
   template <typename Visit>
   void walk(std::span<const double> onsets, double within, const Visit& visit) {
     std::vector<Active> active;
+    std::vector<KernelSums> always(drive_.scales.size(), none());  // stationary: of the segment, as if from its begin
     std::size_t next_onset = 0, next_look = 0;
     for (std::size_t k = 0; k < drive_.steps.size(); ++k) {
       const PoseSumDetector::Step& step = drive_.steps[k];
       if (std::ranges::binary_search(drive_.segment_starts, k)) {
         active.clear();
+        std::ranges::for_each(always, &KernelSums::reset);
       }
       const double now = step.begin + step.h;
+      std::erase_if(active, [&](const Active& each) { return now - onsets[each.which] > within; });
+      const std::size_t before = active.size();
       for (; next_onset < onsets.size() && onsets[next_onset] < now - kSameTime; ++next_onset) {
         if (onsets[next_onset] >= step.begin - kSameTime) {
-          active.push_back({next_onset, {}, std::vector<KernelSums>(drive_.scales.size(), none())});
+          active.push_back({next_onset,
+                            step.begin,
+                            now,
+                            {},
+                            stationary_ ? always : std::vector(always.size(), none()),
+                            Eigen::ArrayXd::Zero(signals_.rows())});
         }
       }
-      std::erase_if(active, [&](const Active& each) { return now - onsets[each.which] > within; });
-      for (Active& each : active) {
-        take(k, step.begin - onsets[each.which], each);
+      if (stationary_) {
+        sign(k, 1.0, 1.0);
+        for (std::size_t j = before; j < active.size(); ++j) {
+          active[j].cut = signals_.col(kCut);
+        }
+        add(step.h, always);
+        for (std::size_t j = before; j < active.size(); ++j) {
+          if (Active& each = active[j]; onsets[each.which] > step.begin + kSameTime) {
+            each.begun = now;
+            each.sums = always;
+            each.cut += signals_.col(kMoved).abs();
+          }
+        }
+      } else {
+        for (Active& each : active) {
+          take(k, step.begin - onsets[each.which], each);
+        }
       }
       for (; next_look < drive_.looks.size() && drive_.looks[next_look].step == k; ++next_look) {
         for (const Active& each : active) {
-          if (speaks_of(drive_.looks[next_look].weight)) {
-            visit(each.which, next_look, now - onsets[each.which], moved_by(each, next_look),
-                  [&] { return row(each, next_look); });
+          if (const At at{each, next_look, stationary_ ? &always : nullptr};
+              speaks_of(drive_.looks[next_look].weight)) {
+            visit(each.which, next_look, now - onsets[each.which], value(at, kMoved), [&] { return row(at); });
           }
         }
       }
@@ -62,16 +86,24 @@ class PoseResponse {
   }
 
  private:
-  // A fault that has set in.
+  // A fault that has set in: sums of its own, or what the shared ones held when it did.
   struct Active {
     std::size_t which = 0;
-    std::array<double, 2> angle{};  // of the joints since the onset
+    double begun = 0.0, first_end = 0.0;  // s: of the first step that is in the sums, and of the one it set in
+    std::array<double, 2> angle{};        // of the joints since the onset
     std::vector<KernelSums> sums;
+    Eigen::ArrayXd cut;   // weights: in doubt of the step in which it set in
     bool sets_in = true;  // in the next step
   };
-  // Columns of signals_: what κ moves the sum by at the estimate, what is in doubt, c, and g1
-  // of the parameters where there is any; s_ is the first of s.
-  static constexpr Eigen::Index kMoved = 0, kDoubt = 1, kOffset = 2, kParameters = 3;
+  // A look after an onset.
+  struct At {
+    const Active& of;
+    std::size_t look = 0;
+    const std::vector<KernelSums>* always = nullptr;
+  };
+  // Columns of signals_: what κ moves the sum by at the estimate, what is in doubt, what more where the share jumps, c,
+  // and g1 of the parameters where there is any; s_ is the first of s.
+  static constexpr Eigen::Index kMoved = 0, kDoubt = 1, kCut = 2, kOffset = 3, kParameters = 4;
 
   [[nodiscard]] KernelSums none() const { return {signals_.rows(), signals_.cols()}; }
 
@@ -89,14 +121,33 @@ class PoseResponse {
 
   void take(std::size_t k, double since, Active& each) {
     const PoseSumDetector::Step& step = drive_.steps[k];
-    const bool first = std::exchange(each.sets_in, false), within = since < -kSameTime;
+    const bool first = std::exchange(each.sets_in, false);
     const double begin = share_at(std::max(since, 0.0), each, step);
     for (std::size_t w = 0; w < 2; ++w) {
       each.angle[w] += step.moved[w];
     }
     const double end = share_at(std::max(since, 0.0) + step.h, each, step);
-    // Of a step in the midst of which the fault sets in, anything between nothing and all.
-    const double s = 0.5 * (begin + end) * (within ? 0.5 : 1.0), jump = std::abs(end - begin) + (first ? begin : 0.0);
+    sign(k, 0.5 * (begin + end), std::abs(end - begin) + (first ? begin : 0.0));
+    signals_.col(kDoubt) += signals_.col(kCut);
+    if (since < -kSameTime) {  // in the midst of the step: anything between nothing and all
+      signals_.col(kDoubt) += signals_.col(kMoved).abs();
+      signals_.col(kMoved).setZero();
+      signals_.rightCols(signals_.cols() - kOffset).setZero();
+    }
+    add(step.h, each.sums);
+  }
+
+  void add(double h, std::vector<KernelSums>& sums) const {
+    for (std::size_t j = 0; j < sums.size(); ++j) {
+      const double x = h / drive_.scales[j];
+      sums[j].advance(x, std::exp(-x));
+      sums[j].add(signals_);
+    }
+  }
+
+  // Signals of a step in which the fault's share is s on average, and jumps by `jump` (kCut is of that).
+  void sign(std::size_t k, double s, double jump) {
+    const PoseSumDetector::Step& step = drive_.steps[k];
     const Eigen::Vector2d way(step.moved[0], step.moved[1]);
     const Eigen::Vector2d rolled = s * signature_.rolled * way, shown = s * signature_.shown * way;
     const double read = signature_.read_share() * jump * model_.errors.motion;
@@ -120,7 +171,7 @@ class PoseResponse {
         if (signals_.cols() > s_) {
           signals_(row, s_ + parameter) = factor * shown[j];
         }
-        signals_(row, kDoubt) += read * std::abs(factor) * (of_position ? drive_.radius : drive_.yaw_gain)[wheel];
+        signals_(row, kCut) += read * std::abs(factor) * (of_position ? drive_.radius : drive_.yaw_gain)[wheel];
         if (of_position) {  // headings turn what was shown, unforeseen
           signals_(row, kDoubt) += 0.5 * turning * size * drive_.radius[wheel] * std::abs(shown[j]);
         }
@@ -128,37 +179,38 @@ class PoseResponse {
       signals_(row, kOffset) = of_position ? s * step.h * (signature_.along * along + fault_.lateral * across)
                                            : s * step.h * signature_.turning * gx;
       signals_(row, kMoved) += signals_(row, kOffset);
-      signals_(row, kDoubt) += within ? std::abs(signals_(row, kMoved)) : 0.0;
-    }
-    for (std::size_t j = 0; j < drive_.scales.size(); ++j) {
-      const double x = step.h / drive_.scales[j];
-      each.sums[j].advance(x, std::exp(-x));
-      each.sums[j].add(signals_);
     }
   }
 
-  [[nodiscard]] double value(const Active& each, std::size_t look, Eigen::Index column) const {
-    const PoseSumDrive::Look& at = drive_.looks[look];
-    return each.sums[at.scale].value(static_cast<Eigen::Index>(at.weight), column, SumKernel::kShape);
+  [[nodiscard]] double value(const At& at, Eigen::Index column) const {
+    const PoseSumDrive::Look& look = drive_.looks[at.look];
+    const auto weight = static_cast<Eigen::Index>(look.weight);
+    const KernelSums& own = at.of.sums[look.scale];
+    if (at.always == nullptr) {
+      return own.value(weight, column, SumKernel::kShape);
+    }
+    const double x = (drive_.end(look.step) - at.of.begun) / drive_.scales[look.scale];
+    return (*at.always)[look.scale].since(weight, column, own, x, std::exp(-x));
   }
-  [[nodiscard]] double moved_by(const Active& each, std::size_t look) const { return value(each, look, kMoved); }
 
-  [[nodiscard]] SumRow row(const Active& each, std::size_t look) const {
-    const double radius = drive_.looks[look].radius;
+  [[nodiscard]] SumRow row(const At& at) const {
+    const PoseSumDrive::Look& look = drive_.looks[at.look];
     SumRow row;
-    row.y = drive_.y.row(static_cast<Eigen::Index>(look));
+    row.y = drive_.y.row(static_cast<Eigen::Index>(at.look));
     row.g1 = row.g2 = row.s = row.range = row.none = Eigen::VectorXd::Zero(p_);
     const auto fill = [&](Eigen::Index first, Eigen::Index end, Eigen::VectorXd& to) {
       for (Eigen::Index j = 0; first + j < end; ++j) {
-        to[j] = value(each, look, first + j);
+        to[j] = value(at, first + j);
       }
     };
     fill(kParameters, s_, row.g1);
     fill(s_, signals_.cols(), row.s);
-    row.c = value(each, look, kOffset);
-    row.dy = radius;
+    row.c = value(at, kOffset);
+    row.dy = look.radius;
     // The radius holds what the encoders' errors do in the sum, by parts; K and S have a share of them.
-    row.doubt = value(each, look, kDoubt) + signature_.read_share() * radius;
+    const double x = (drive_.end(look.step) - at.of.first_end) / drive_.scales[look.scale];
+    row.doubt = std::max(0.0, value(at, kDoubt)) + signature_.read_share() * look.radius +
+                SumKernel::at(SumKernel::kShape, x, std::exp(-x)) * at.of.cut[static_cast<Eigen::Index>(look.weight)];
     return row;
   }
 
@@ -167,6 +219,7 @@ class PoseResponse {
   const PoseSumDrive& drive_;
   OdometrySignature signature_;
   Eigen::Index p_, gains_, s_;
+  bool stationary_;          // there in full from its onset on
   Eigen::ArrayXXd signals_;  // weights × columns, of the newest step
 };
 

@@ -49,6 +49,9 @@ struct PoseSumDrive {
   std::vector<Look> looks;                     ///< in the order of time
   core::RowMatrix y;                           ///< looks × p
   std::array<double, 2> radius{}, yaw_gain{};  ///< at most
+
+  /// When a step ends, s.
+  [[nodiscard]] double end(std::size_t step) const { return steps[step].begin + steps[step].h; }
 };
 
 /// Walks up to `most` s of `log` through the PoseSumDetector of `model`, whose false alarms are `false_alarms` a

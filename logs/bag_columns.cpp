@@ -153,7 +153,11 @@ class Chooser {
     }
   }
 
-  void take_mapped(const std::string& name, const std::string& field) {
+  void take_mapped(const std::string& name, const std::string& mapped) {
+    const auto [field, factor] = split_factor(mapped);
+    if (factor != 1.0) {
+      choice_.notes.push_back(fmt::format("{} is {} times {:g}", name, field, factor));
+    }
     std::optional<std::size_t> found;
     for (std::size_t k = 0; k < topics_.size(); ++k) {
       const std::string& own = topic(k).name;
@@ -181,9 +185,9 @@ class Chooser {
     check_element(*found, name, path);
     const std::vector<std::string> numbers = numeric_paths(*own.definition);
     if (yaw && std::ranges::find(numbers, path) == numbers.end()) {
-      take(*found, {name, yaw_fields(path.substr(0, path.size() - 4)), BagColumn::Rule::yaw});
+      take(*found, {name, yaw_fields(path.substr(0, path.size() - 4)), BagColumn::Rule::yaw, factor});
     } else {
-      take(*found, {name, {path}});
+      take(*found, {name, {path}, BagColumn::Rule::value, factor});
     }
   }
 

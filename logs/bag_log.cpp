@@ -128,13 +128,13 @@ double yaw_of(const double* q) {
 /// What `column` makes of its fields.
 double value_of(const BagColumn& column, const double* numbers) {
   if (column.is_yaw()) {
-    return yaw_of(numbers);
+    return column.factor * yaw_of(numbers);
   }
   double sum = 0.0;
   for (std::size_t k = 0; k < column.fields.size(); ++k) {
     sum += numbers[k];
   }
-  return column.rule == BagColumn::Rule::mean ? sum / static_cast<double>(column.fields.size()) : sum;
+  return column.factor * (column.rule == BagColumn::Rule::mean ? sum / static_cast<double>(column.fields.size()) : sum);
 }
 
 /// A message that waits for earlier ones that come late.

@@ -60,6 +60,7 @@ struct BagColumn {
   std::string name;                 ///< of the contract
   std::vector<std::string> fields;  ///< paths for RosExtractor
   Rule rule = Rule::value;
+  double factor = 1.0;  ///< of all of it
   [[nodiscard]] bool is_yaw() const { return rule == Rule::yaw; }
   bool operator==(const BagColumn&) const = default;
 };
@@ -87,7 +88,7 @@ struct BagTopicView {
 
 /// Chooses columns. What `options.map` says goes first: NAME=TOPIC.PATH, e.g.
 /// omega_r=/joint_states.velocity[right_wheel], the PATH as RosExtractor takes it, or ending in `.yaw` behind a
-/// quaternion. Else:
+/// quaternion; *FACTOR behind it multiplies it. Else:
 /// - sensor_msgs/JointState: the joints that are named right and left (of those named wheel, where there are any; no
 ///   casters) give phi, omega and tau; of several wheels a side the mean of the motion and the sum of the efforts; a
 ///   topic with one joint gives position, velocity and effort, too, and its own name may tell the side;

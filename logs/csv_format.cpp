@@ -99,18 +99,6 @@ std::size_t demand_field(const std::vector<std::string>& fields, const std::stri
                                core::listed(fields), files::did_you_mean(name, fields)));
 }
 
-/// COLUMN*FACTOR in its parts; the factor is 1 where there is none.
-std::pair<std::string, double> with_factor(const std::vector<std::string>& fields, const std::string& text) {
-  const std::size_t star = text.rfind('*');
-  if (star == std::string::npos || find_field(fields, text)) {
-    return {text, 1.0};
-  }
-  const auto factor = files::to_number(trimmed_field(std::string_view(text).substr(star + 1)));
-  return factor && std::isfinite(*factor) && *factor != 0.0
-             ? std::pair{std::string(trimmed_field(std::string_view(text).substr(0, star))), *factor}
-             : std::pair{text, 1.0};
-}
-
 void recognise(CsvHeader& header, const CsvOptions& options, const std::string& place) {
   std::map<std::string, std::vector<std::size_t>> candidates;
   for (std::size_t k = 0; k < header.fields.size(); ++k) {
@@ -169,6 +157,17 @@ std::vector<std::string> split_fields(std::string_view line, char separator) {
   return fields;
 }
 
+std::pair<std::string, double> split_factor(const std::string& text) {
+  const std::size_t star = text.rfind('*');
+  if (star == std::string::npos) {
+    return {text, 1.0};
+  }
+  const auto factor = files::to_number(trimmed_field(std::string_view(text).substr(star + 1)));
+  return factor && std::isfinite(*factor) && *factor != 0.0
+             ? std::pair{std::string(trimmed_field(std::string_view(text).substr(0, star))), *factor}
+             : std::pair{text, 1.0};
+}
+
 CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, const std::string& place) {
   check_is_text(line, place);
   CsvHeader header;
@@ -176,7 +175,7 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
   header.fields = split_fields(line, header.separator);
   check_has_names(header.fields, place);
   for (const auto& [name, column] : options.map) {
-    const auto [field, factor] = with_factor(header.fields, column);
+    const auto [field, factor] = find_field(header.fields, column) ? std::pair{column, 1.0} : split_factor(column);
     header.found[name] = demand_field(header.fields, field, "which --map " + name + "=" + column + " names", place);
     if (factor != 1.0) {
       header.factors[name] = factor;

@@ -19,9 +19,9 @@ namespace wheelwright::logs {
 
 /// Options for reading a CSV log.
 struct CsvOptions {
-  /// Contract name (or a name in `extra`) -> column of the file, for headers that no spelling covers
-  /// (`--map name=column`). It goes before everything else. COLUMN*FACTOR multiplies what stands in COLUMN, for logs in
-  /// other units, where no column is called so.
+  /// Contract name (or a name in `extra`) -> column of the file (of a bag TOPIC.PATH, of an HDF5 file a dataset), for
+  /// headers that no spelling covers (`--map name=column`). It goes before everything else. COLUMN*FACTOR multiplies what
+  /// stands in COLUMN, for logs in other units, where no column is called so.
   std::map<std::string, std::string> map;
   /// Further columns to read under their own names; a file that lacks one is an error.
   std::vector<std::string> extra;
@@ -39,6 +39,9 @@ struct CsvHeader {
   std::map<std::string, std::size_t> found;  ///< wanted name (`t` among them) -> field
   std::map<std::string, double> factors;     ///< wanted name -> FACTOR of its field, where it has one
 };
+
+/// COLUMN and FACTOR of COLUMN*FACTOR; the whole and 1 where it is none.
+[[nodiscard]] std::pair<std::string, double> split_factor(const std::string& text);
 
 /// Splits `line` at `separator`; quotes around a field are removed ("" inside them is one quote), and blanks around it.
 [[nodiscard]] std::vector<std::string> split_fields(std::string_view line, char separator);

@@ -41,6 +41,7 @@ struct Source {
   std::string unit;
   hsize_t rows = 0;
   std::string refused{};  ///< why it is not read, without a subject; empty where it is
+  double factor = 1.0;    ///< by which its values are multiplied
 
   [[nodiscard]] std::string name() const { return member.empty() ? path.substr(path.rfind('/') + 1) : member; }
   [[nodiscard]] std::string shown() const { return member.empty() ? path : path + "." + member; }
@@ -277,7 +278,7 @@ class DatasetChooser {
     }
     const std::string home = home_of_time();
     for (const auto& [name, place] : options_.map) {
-      take(name, named(place, home, name));
+      take_mapped(name, place, home);
     }
     for (const Source& source : sources_) {
       if (source.home() == home) {
@@ -298,8 +299,10 @@ class DatasetChooser {
 
   [[nodiscard]] std::string home_of_time() {
     if (const auto mapped = options_.map.find("t"); mapped != options_.map.end()) {
+      const std::string place = split_factor(mapped->second).first;
       for (const Source& source : sources_) {
-        if (source.shown() == mapped->second || source.name() == mapped->second) {
+        if (source.shown() == mapped->second || source.name() == mapped->second || source.shown() == place ||
+            source.name() == place) {
           return source.home();
         }
       }
@@ -324,17 +327,34 @@ class DatasetChooser {
     return homes.front();
   }
 
-  [[nodiscard]] Source named(const std::string& place, const std::string& home, const std::string& name) const {
+  [[nodiscard]] const Source* find(const std::string& place, const std::string& home) const {
     for (const bool anywhere : {false, true}) {
       for (const Source& source : sources_) {
         const bool here = source.home() == home && source.name() == place;
         if (anywhere ? source.shown() == place || source.shown() == "/" + place : here) {
-          return source;
+          return &source;
         }
       }
     }
+    return nullptr;
+  }
+
+  [[nodiscard]] Source named(const std::string& place, const std::string& home, const std::string& name) const {
+    if (const Source* source = find(place, home)) {
+      return *source;
+    }
     throw InputError(fmt::format("{}: no dataset {} for column {}: the file has {}{}", path_, files::shown(place), name,
                                  core::listed(choice_.header), files::did_you_mean(place, choice_.header)));
+  }
+
+  void take_mapped(const std::string& name, const std::string& mapped, const std::string& home) {
+    const auto [place, factor] = find(mapped, home) != nullptr ? std::pair{mapped, 1.0} : split_factor(mapped);
+    Source source = named(place, home, name);
+    source.factor = factor;
+    if (factor != 1.0) {
+      choice_.notes.push_back(fmt::format("{} is {} times {:g}", name, source.shown(), factor));
+    }
+    take(name, std::move(source));
   }
 
   void take(const std::string& name, Source source) {
@@ -406,7 +426,7 @@ class Hdf5Walk final : public RowWalk {
       return false;
     }
     for (std::size_t k = 0; k < columns_.size(); ++k) {
-      row_[k] = columns_[k].at(next_);
+      row_[k] = factors_[k] * columns_[k].at(next_);
     }
     ++next_;
     outcome = cleaner_.clean(row_, static_cast<std::size_t>(next_));
@@ -438,6 +458,7 @@ class Hdf5Walk final : public RowWalk {
   void open_column(const std::string& name) {
     const Source& source = choice_.found.at(name);
     columns_.emplace_back(file_.get(), source, fmt::format("{}: {}", path_.string(), source.shown()));
+    factors_.push_back(source.factor);
   }
 
   std::filesystem::path path_;
@@ -450,6 +471,7 @@ class Hdf5Walk final : public RowWalk {
   hsize_t rows_;
   hsize_t next_ = 0;
   std::vector<ColumnReader> columns_;
+  std::vector<double> factors_;  // of each
 };
 
 class Hdf5File final : public RowFile {

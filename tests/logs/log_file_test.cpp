@@ -281,6 +281,32 @@ TEST_F(LogFile, ADatasetInAnotherUnitIsNotTakenAndThatIsSaid) {
   EXPECT_EQ(read({file}, options).names.size(), drive().names.size()) << "asked for by name, it is";
 }
 
+TEST_F(LogFile, AFactorBehindAColumnMultipliesItInEveryFormat) {
+  const LogTable table = drive();
+  const std::vector<std::pair<std::string, std::string>> places{{"a.csv", "omega_r"},
+                                                                {"a.h5", "omega_r"},
+                                                                {"a.h5", "/log/omega_r"},
+                                                                {"a.mcap", "/joint_states.velocity[right_wheel]"},
+                                                                {"a.db3", "/joint_states.velocity[right_wheel]"}};
+  for (const auto& [name, place] : places) {
+    const std::filesystem::path file = write(name, table);
+    for (const std::string factor : {"*-2", " * 0.25"}) {
+      LogOptions options;
+      options.map = {{"omega_r", place + factor}};
+      const LogTable found = read({file}, options);
+      const double times = factor == "*-2" ? -2.0 : 0.25;
+      for (std::size_t k = 0; k < table.rows(); ++k) {
+        ASSERT_EQ(found.column("omega_r")[k], times * table.column("omega_r")[k]) << name << factor;
+      }
+      EXPECT_EQ(found.column("omega_l"), table.column("omega_l")) << name;
+      EXPECT_THAT(report.files[0].notes, Contains(HasSubstr(fmt::format(" times {:g}", times)))) << name;
+    }
+    LogOptions none;
+    none.map = {{"omega_r", place + "*fast"}};
+    EXPECT_THROW(read({file}, none), InputError) << name;
+  }
+}
+
 TEST_F(LogFile, AFailedWriteLeavesNothing) {
   LogTable table = drive();
   for (const std::string name : {"a.csv", "a.h5", "a.mcap", "a.db3", "bag"}) {
