@@ -2,14 +2,11 @@
 #include <wheelwright/results/model_check.hpp>
 
 #include <algorithm>
-#include <cmath>
-#include <set>
 #include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/bounds/slab_rows.hpp>
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/commission/pose_at_risk.hpp>
@@ -99,6 +96,23 @@ void judge_detector(const ModelClaims& claims, ModelCheck& result) {
   judge("joint_sample", Eigen::VectorXd::Constant(1, watched.joint_sample),
         Eigen::VectorXd::Constant(1, proved.joint_sample));
   judge("heading", Eigen::VectorXd::Constant(1, watched.heading), Eigen::VectorXd::Constant(1, proved.heading));
+}
+
+void judge_kinematic_prior(const KinematicClaims& claims, const Robot& robot, std::vector<std::string>& warnings) {
+  const commission::KinematicCommissionOptions usual;
+  for (std::size_t j = 0; j < claims.parameter_names.size(); ++j) {
+    const std::string& name = claims.parameter_names[j];
+    const double nominal = robot.wheel_radius / (name.starts_with("yaw_gain") ? robot.track_width : 1.0);
+    const Interval known = name == "gyro_bias"
+                               ? Interval{-usual.bias, usual.bias}
+                               : Interval{(1.0 - usual.radius_share) * nominal, (1.0 + usual.radius_share) * nominal};
+    const Interval& stated = claims.prior.sides[j];
+    if (known.lower < stated.lower || stated.upper < known.upper) {
+      warnings.push_back(
+          fmt::format("the prior of {}, [{}, {}], is narrower than the default of this version, [{}, {}]", name,
+                      stated.lower, stated.upper, known.lower, known.upper));
+    }
+  }
 }
 
 SetCheck check_kinematic(const KinematicClaims& claims, const Robot& robot, LogSource& log) {
@@ -193,8 +207,7 @@ void tell_kinematic_premises(const KinematicClaims& claims, std::vector<std::str
   const auto estimated = std::ranges::count(claims.origin, core::NoiseOrigin::estimated);
   premises.push_back(fmt::format(
       "of wheel radii and yaw gains: their prior, the window of {:g} s, the errors of pose, gyro and wheels ({}) and "
-      "the "
-      "wheels' largest acceleration between samples that the model states; how windows of odometry are made, which "
+      "the wheels' largest acceleration between samples that the model states; how windows of odometry are made, which "
       "commissioning and this check have in common",
       claims.model.window,
       estimated == 0 ? "declared"
@@ -204,9 +217,9 @@ void tell_kinematic_premises(const KinematicClaims& claims, std::vector<std::str
   if (claims.at_risk) {
     premises.push_back(fmt::format(
         "of the pose at a risk of {:g}: that its errors are as the robot file says and of no larger mean; the "
-        "inequality "
-        "for their sums (docs/risk.md); that scales, the delay, and the part of the log on which V0 is learnt were "
-        "chosen without this log; and how the sums are made, which commissioning and this check have in common",
+        "inequality for their sums (docs/risk.md); that scales, the delay, and the part of the log on which V0 is "
+        "learnt were chosen without this log; and how the sums are made, which commissioning and this check have in "
+        "common",
         claims.model.at_risk->risk));
   } else if (claims.model.at_risk) {
     premises.emplace_back(
@@ -284,6 +297,7 @@ ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::Lo
     }
   }
   if (claims.kinematic) {
+    judge_kinematic_prior(*claims.kinematic, claims.robot, result.warnings);
     result.kinematic = check_kinematic(*claims.kinematic, claims.robot, log);
     add(result.kinematic->failures);
     if (claims.kinematic->at_risk) {
@@ -338,8 +352,7 @@ std::string pose_risk_verdict(const SetCheck& check, const KinematicClaims& clai
   }
   return fmt::format(
       "of the pose at a risk of {:g}: all {} bounds and {} facets follow from the guaranteed set and from sums over "
-      "the "
-      "log, at all of which together that risk is run",
+      "the log, at all of which together that risk is run",
       risk, check.bounds.size(), claims.at_risk->facets.size());
 }
 

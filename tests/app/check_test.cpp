@@ -195,6 +195,16 @@ TEST_F(CheckPose, SmallerErrorsThanTheRobotsAreRefused) {
   EXPECT_THAT(failures([](Json& k) { k["at_risk"]["risk"] = 1e-15; }), HasSubstr("kinematic.at_risk.feasible_set.A"));
 }
 
+TEST_F(CheckPose, ANarrowerPriorOfTheWheelsIsTold) {
+  commission_posed();
+  Json model = read_json(path("model/model.json"));
+  Json& side = model.at("kinematic").at("feasible_set").at("prior").at(0);
+  side[0] = 0.09;
+  files::write_json(path("changed.json"), model);
+  const Outcome outcome = run("check changed.json drive.csv");
+  EXPECT_THAT(outcome.out, HasSubstr("the prior of radius_right, [0.09, "));
+}
+
 TEST_F(CheckPose, AnOlderModelIsSaidNotToBeChecked) {
   commission_posed();
   Json model = read_json(path("model/model.json"));
