@@ -153,6 +153,8 @@ std::string at_risk_section(const commission::RiskWatch& watch, const OnlineMode
              : out + table({"alarm", "until", "matched to", numeric("over, s"), numeric("times the threshold")}, rows);
 }
 
+const std::vector<detector::Isolation> kNoIsolations;
+
 }  // namespace
 
 std::string detect_report(const Detection& detection, const OnlineModel& model, const ReportContext& context,
@@ -176,13 +178,14 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   const bool fault = !detection.events.empty() || kinematic_events > 0 || !at_risk.events.empty();
   content.status = fault ? "bad" : detection.instants == 0 ? "caution" : "good";
   content.verdict = detect_verdict(detection, kinematic_events + at_risk.events.size());
-  content.sentences = detect_words(detection, model, isolations, axis);
-  for (std::size_t k = incidents.size(); k-- > 0;) {
-    content.sentences.insert(content.sentences.begin(), core::capital(incident_sentence(incidents[k])));
+  for (const detector::Incident& incident : incidents) {  // what an event may be is said of its incident
+    content.sentences.push_back(core::capital(incident_sentence(incident)));
   }
   if (!at_risk.events.empty()) {
-    content.sentences.insert(content.sentences.begin(),
-                             core::capital(commission::sentence(at_risk.events.front(), model.model)) + ".");
+    content.sentences.push_back(core::capital(commission::sentence(at_risk.events.front(), model.model)) + ".");
+  }
+  for (std::string& sentence : detect_words(detection, model, incidents.empty() ? isolations : kNoIsolations, axis)) {
+    content.sentences.push_back(std::move(sentence));
   }
   if (kinematic_events > 0) {
     const detector::Event& first = kinematic.detection->events.front();

@@ -140,7 +140,7 @@ std::string record_sentence(const Diagnosis& d) {
     case GapVerdict::unexplained:
       return d.causes.empty()
                  ? std::string()
-                 : fmt::format("Of {} causes that were named so {}, {} were there.", r.causes, on, r.present);
+                 : fmt::format("Of {} causes that were named so {} {} were there.", r.causes, on, r.present);
   }
   return {};
 }
