@@ -53,8 +53,9 @@ struct PoseAtRisk {
 };
 
 /// The set of `model` (the guaranteed one) cut by sums (pose_sum_rows()) with all their risks together
-/// PoseAtRiskOptions::risk; V0 of later driving; and the test: the log contradicts the assumption where no parameters are left, where a sum stands outside, or where sums
-/// spread wider than such errors make them, time and again. `seconds`: of the log.
+/// PoseAtRiskOptions::risk; V0 of later driving; and the test: the log contradicts the assumption where no parameters
+/// are left, where a sum stands outside, or where sums spread wider than such errors make them, time and again.
+/// `seconds`: of the log.
 [[nodiscard]] PoseAtRisk pose_at_risk(LogSource& log, const detector::KinematicModel& model,
                                       const detector::PoseErrors& errors, double seconds,
                                       const PoseAtRiskOptions& options = {});

@@ -5,7 +5,8 @@
 ///
 /// Over the steps j after its onset a fault adds to a sum
 ///
-///     κ Σ K_j g_jᵀ (E_j q_j r/2 + s_j (E_j a_1 + E_j⊥ d) h_j),   or   κ Σ K_j g_j (c_R q_R,j − c_L q_L,j + s_j a_2 h_j),
+///     κ Σ K_j g_jᵀ (E_j q_j r/2 + s_j (E_j a_1 + E_j⊥ d) h_j),
+///     κ Σ K_j g_j (c_R q_R,j − c_L q_L,j + s_j a_2 h_j)         of headings,
 ///
 /// q_j what the wheels roll beyond what their encoders show in a healthy robot (OdometryFaultRows), and what the
 /// encoders show beyond it stands in the regressor: the polynomial of FaultRow, solved exactly for every ϑ of the set

@@ -20,8 +20,8 @@ namespace wheelwright::logs {
 /// Options for reading a CSV log.
 struct CsvOptions {
   /// Contract name (or a name in `extra`) -> column of the file (of a bag TOPIC.PATH, of an HDF5 file a dataset), for
-  /// headers that no spelling covers (`--map name=column`). It goes before everything else. COLUMN*FACTOR multiplies what
-  /// stands in COLUMN, for logs in other units, where no column is called so.
+  /// headers that no spelling covers (`--map name=column`). It goes before everything else. COLUMN*FACTOR multiplies
+  /// what stands in COLUMN, for logs in other units, where no column is called so.
   std::map<std::string, std::string> map;
   /// Further columns to read under their own names; a file that lacks one is an error.
   std::vector<std::string> extra;
