@@ -108,9 +108,7 @@ void take_smaller(std::vector<detector::FaultMargins>& all, const std::vector<de
 void add_at_risk(MarginSurvey& survey, LogSource& log, const OnlineModel& model,
                  const detector::ReferenceMotion& motion, const std::vector<FaultType>& faults,
                  const std::vector<detector::OnsetMargin>& worst_case, const MarginSurveyOptions& options) {
-  const bool of_pose = model.kinematic && model.kinematic->at_risk &&
-                       std::ranges::all_of(model.kinematic->measurement.columns(),
-                                           [&](const std::string& name) { return log.find(name).has_value(); });
+  const bool of_pose = watches_pose(log, model);
   if (!model.at_risk && !of_pose) {
     survey.without_risk = "the model says nothing at a stated risk (docs/risk.md)";
     return;

@@ -190,15 +190,11 @@ std::optional<detector::PoseErrors> pose_errors(const Robot& robot, double short
 }
 
 RegressionBlock pose_sum_rows(LogSource& log, const detector::KinematicModel& guaranteed,
-                              const PoseSumSettings& settings) {
+                              const detector::PoseRiskModel& risk, double learning) {
   detector::KinematicModel model = guaranteed;
-  detector::PoseRiskModel& risk = model.at_risk.emplace();
-  risk.errors = settings.errors;
-  risk.scales = settings.scales;
-  risk.delay = settings.delay;
-  risk.risk = settings.risk;
-  risk.facets = model.facets;
-  risk.box = model.box;
+  model.at_risk = risk;
+  model.at_risk->facets = model.facets;
+  model.at_risk->box = model.box;
   RowTable rows(model.box);
   for (std::size_t k = 0; k < model.facets.size(); ++k) {
     const Eigen::VectorXd opposite = -model.facets[k].a;
@@ -206,9 +202,9 @@ RegressionBlock pose_sum_rows(LogSource& log, const detector::KinematicModel& gu
     const double half = 0.5 * (upper - lower) * (1.0 + kFacetRounding) + kFacetRounding * std::abs(upper);
     rows.add(k, 0.0, model.facets[k].a, 0.5 * (upper + lower), half);
   }
-  const double learnt = time_at(log, settings.learning);
+  const double learnt = time_at(log, learning);
   learn_usual(log, model, learnt);
-  detector::PoseSumDetector sums(model, {.false_alarms = settings.risk / std::max(driven(log), 1.0)});
+  detector::PoseSumDetector sums(model, {.false_alarms = risk.risk / std::max(driven(log), 1.0)});
   std::size_t number = model.facets.size();
   walk_poses(log, sums, learnt, core::kInfinity, [&] {
     for (const detector::SumState& look : sums.looks()) {
@@ -230,36 +226,32 @@ PoseAtRisk pose_at_risk(LogSource& log, const detector::KinematicModel& guarante
                         double seconds, const PoseAtRiskOptions& options) {
   PoseAtRisk result;
   const PoseSteps steps = pose_steps(log, guaranteed.measurement);
-  PoseSumSettings settings{
-      .errors = errors, .scales = {}, .delay = 0.0, .risk = options.risk, .learning = options.learning};
-  std::ranges::copy_if(options.scales, std::back_inserter(settings.scales),
+  detector::KinematicModel model = guaranteed;
+  detector::PoseRiskModel& risk = model.at_risk.emplace();
+  risk.risk = options.risk;
+  risk.errors = errors;
+  std::ranges::copy_if(options.scales, std::back_inserter(risk.scales),
                        [&](double scale) { return scale >= kFewestSteps * steps.median; });
-  settings.delay = std::max({kForesight, kForesightSteps * steps.median,
-                             0.5 * std::max(errors.position.correlation, errors.heading.correlation)});
-  if (!(steps.shortest > 0.0) || settings.scales.empty()) {
+  risk.delay = std::max({kForesight, kForesightSteps * steps.median,
+                         0.5 * std::max(errors.position.correlation, errors.heading.correlation)});
+  if (!(steps.shortest > 0.0) || risk.scales.empty()) {
     result.detail = "the log has too few poses";
     return result;
   }
-  core::RegressionTable rows(pose_sum_rows(log, guaranteed, settings));
+  core::RegressionTable rows(pose_sum_rows(log, guaranteed, risk, options.learning));
   FeasibleSet set = feasible_set(rows, guaranteed.box);
   if (set.status == FeasibleSet::Status::empty) {
     result.verdict = core::AssumptionVerdict::fails;
     result.detail = "no wheel radii and yaw gains are left";
     return result;
   }
-  detector::KinematicModel model = guaranteed;
-  detector::PoseRiskModel& risk = model.at_risk.emplace();
-  risk.risk = settings.risk;
-  risk.errors = settings.errors;
-  risk.scales = settings.scales;
-  risk.delay = settings.delay;
   risk.facets = set.polytope->facets();
   risk.box = set.hull;
   learn_usual(log, model, core::kInfinity);
   test_on_log(log, model, seconds, options, result);
   if (result.verdict == core::AssumptionVerdict::holds) {
     result.model = std::move(model.at_risk);
-    result.proof = {std::move(set.lower), std::move(set.upper), settings.learning};
+    result.proof = {std::move(set.lower), std::move(set.upper), options.learning};
   }
   return result;
 }

@@ -28,21 +28,13 @@ struct PoseAtRiskOptions {
 /// `shortest_step`: s, between poses.
 [[nodiscard]] std::optional<detector::PoseErrors> pose_errors(const Robot& robot, double shortest_step);
 
-/// Rows of the sums that cut the set at a risk, one output, with what they stand on.
-struct PoseSumSettings {
-  detector::PoseErrors errors{};
-  std::vector<double> scales{};  ///< s
-  double delay = 0.0;            ///< s, by which weights foresee
-  double risk = 0.0;             ///< of all looks together
-  double learning = 0.0;         ///< share of the log of which V0 is learnt
-};
-
 /// The half-spaces of which the set at a risk is the intersection, as rows |y − Yϑ| <= dy over the box of `model` (the
 /// guaranteed one): first its facets, whose other side is that box, then the sums over scales of 1 s and more at all
 /// looks after the learning, in the order of time, as far as they cut the box; RegressionBlock::sample numbers them,
-/// facets first. The risk is spread over the time driven in `log`. Walks it three times.
+/// facets first. Of `risk` the risk of all looks together, which is spread over the time driven in `log`, errors, scales and
+/// delay are used; V0 is learnt of the share `learning` of the log. Walks it four times.
 [[nodiscard]] RegressionBlock pose_sum_rows(LogSource& log, const detector::KinematicModel& model,
-                                            const PoseSumSettings& settings);
+                                            const detector::PoseRiskModel& risk, double learning);
 
 /// Set, thresholds and verdict.
 struct PoseAtRisk {

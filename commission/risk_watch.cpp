@@ -86,6 +86,12 @@ struct Watched {
 
 }  // namespace
 
+bool watches_pose(const LogSource& log, const OnlineModel& model) {
+  return model.kinematic && model.kinematic->at_risk &&
+         std::ranges::all_of(model.kinematic->measurement.columns(),
+                             [&](const std::string& name) { return log.find(name).has_value(); });
+}
+
 RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) {
   RiskRecorder of_torque(merge), of_pose(merge);  // an event of one residual is not to hide one of the other
   RiskWatch& watch = of_torque.watch();
@@ -96,9 +102,7 @@ RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) 
                    detector::ScaleDetector(model, {.false_alarms = torque_false_alarms(model)}));
     watch.false_alarms += torque_false_alarms(model);
   }
-  if (model.kinematic && model.kinematic->at_risk &&
-      std::ranges::all_of(model.kinematic->measurement.columns(),
-                          [&](const std::string& name) { return log.find(name).has_value(); })) {
+  if (watches_pose(log, model)) {
     pose.emplace(log, model.kinematic->measurement.columns(),
                  detector::PoseSumDetector(*model.kinematic, {.false_alarms = pose_false_alarms(model)}));
     watch.false_alarms += pose_false_alarms(model);

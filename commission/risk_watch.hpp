@@ -57,6 +57,9 @@ class RiskRecorder {
 [[nodiscard]] double torque_false_alarms(const OnlineModel& model);
 [[nodiscard]] double pose_false_alarms(const OnlineModel& model);
 
+/// Whether `model` says something of the pose at a stated risk, and `log` has its columns.
+[[nodiscard]] bool watches_pose(const LogSource& log, const OnlineModel& model);
+
 /// Walks `log` through the ScaleDetector of `model`, and through its PoseSumDetector where it has one and `log` has
 /// the pose's columns.
 [[nodiscard]] RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge = 0.5);

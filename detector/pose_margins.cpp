@@ -5,8 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/for_all.hpp>
 #include <wheelwright/detector/odometry_faults.hpp>
 #include <wheelwright/detector/smallest_certain.hpp>
 #include <wheelwright/detector/sum_kernel.hpp>
@@ -237,22 +235,14 @@ PoseSumDrive read_pose_drive(LogSource& log, const KinematicModel& model, double
   const double share = false_alarms / static_cast<double>(drive.weights.size() * drive.scales.size());
   drive.miss = model.at_risk->risk + share * drive.scales.back() / options.checks;
   std::vector<double> g, rows;
-  const std::vector<std::size_t> pick = core::positions_of(log, model.measurement.columns());
-  std::vector<double> sample(pick.size()), direction(model.measurement.parameters().size());
+  std::vector<double> direction(model.measurement.parameters().size());
   double begun = core::kInfinity;
   std::size_t seen = 0;
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    begun = std::min(begun, block.t[k]);
-    if (block.t[k] - begun > most) {
-      return;
-    }
-    if (starts) {
-      detector.restart();
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    detector.step(block.t[k], sample);
+  const auto wanted = [&](double t) {
+    begun = std::min(begun, t);
+    return t - begun <= most;
+  };
+  walk_pose_samples(log, detector, wanted, [&](bool) {
     if (detector.steps() == seen) {
       return;
     }
@@ -282,8 +272,6 @@ PoseSumDrive read_pose_drive(LogSource& log, const KinematicModel& model, double
 std::vector<FaultMargins> pose_margins_at_risk(const PoseSumDrive& drive, const KinematicModel& model,
                                                const Model& robot, std::span<const FaultType> faults,
                                                std::span<const double> onsets, const SumMarginOptions& options) {
-  check::that(!options.windows.empty() && options.windows.front() > 0.0 && std::ranges::is_sorted(options.windows),
-              "windows", "positive lengths in ascending order");
   std::vector<FaultMargins> all = sides_of(faults, onsets.size());
   for (FaultMargins& margins : all) {
     for (std::size_t k = 0; k < onsets.size(); ++k) {
@@ -302,12 +290,9 @@ std::vector<FaultMargins> pose_margins_at_risk(const PoseSumDrive& drive, const 
       fit[k] = windows_within(options.windows, last.begin + last.h - onsets[k]);
     }
   }
-  const std::vector<std::span<FaultMargins>> sides = by_fault(all, faults);
-  const ThresholdRule rule(Polytope(model.at_risk->facets, model.at_risk->box), model.estimate);
-  core::for_all(
-      faults.size(), options.threads,
-      [&](std::size_t f) {
-        SmallestCertain smallest(sides[f], options.windows);
+  solve_smallest_certain(
+      all, faults, ThresholdRule(Polytope(model.at_risk->facets, model.at_risk->box), model.estimate), options,
+      "margins of the pose at the stated risk", fit, [&](std::size_t f, SmallestCertain& smallest) {
         PoseResponse(faults[f], model, robot, drive)
             .walk(onsets, options.windows.back(),
                   [&](std::size_t onset, std::size_t look, double since, double moved, const auto& row) {
@@ -316,14 +301,6 @@ std::vector<FaultMargins> pose_margins_at_risk(const PoseSumDrive& drive, const 
                         onset, {.since = since, .once = moved, .gap = at.width + 2.0 * at.radius, .channel = at.weight},
                         row);
                   });
-        FaultMargin margin(rule);
-        smallest.solve(margin, [&](std::size_t k) { return fit[k]; });
-      },
-      [&](std::size_t begun) {
-        if (options.progress) {
-          options.progress("margins of the pose at the stated risk",
-                           static_cast<double>(begun) / static_cast<double>(faults.size()));
-        }
       });
   return all;
 }

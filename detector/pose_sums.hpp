@@ -190,26 +190,36 @@ class PoseSumDetector {
   std::vector<double> direction_;
 };
 
-/// Walks the rows of `log` from `from` s on and before `until` s through `detector`, which forgets all samples where a
-/// segment begins; calls looked() where sums were looked at.
-template <typename Looked>
-void walk_poses(LogSource& log, PoseSumDetector& detector, double from, double until, const Looked& looked) {
+/// Walks the rows of `log` whose time is wanted(t) through `detector`, which forgets all samples where a segment begins;
+/// calls taken(whether sums were looked at) after each.
+template <typename Wanted, typename Taken>
+void walk_pose_samples(LogSource& log, PoseSumDetector& detector, const Wanted& wanted, const Taken& taken) {
   const std::vector<std::size_t> pick = core::positions_of(log, detector.measurement().columns());
   std::vector<double> sample(pick.size());
   core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     if (starts) {
       detector.restart();
     }
-    if (block.t[k] < from || block.t[k] >= until) {
+    if (!wanted(block.t[k])) {
       return;
     }
     for (std::size_t c = 0; c < pick.size(); ++c) {
       sample[c] = block.columns[pick[c]][k];
     }
-    if (detector.step(block.t[k], sample)) {
-      looked();
-    }
+    taken(detector.step(block.t[k], sample));
   });
+}
+
+/// The same from `from` s on and before `until` s; calls looked() where sums were looked at.
+template <typename Looked>
+void walk_poses(LogSource& log, PoseSumDetector& detector, double from, double until, const Looked& looked) {
+  walk_pose_samples(
+      log, detector, [&](double t) { return t >= from && t < until; },
+      [&](bool any) {
+        if (any) {
+          looked();
+        }
+      });
 }
 
 /// PoseRiskModel::usual_position and usual_heading: a share of the mean variances on `log`, from `from` s on and before

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <optional>
 
+#include <wheelwright/core/check.hpp>
+#include <wheelwright/core/for_all.hpp>
+
 namespace wheelwright::detector {
 namespace {
 
@@ -20,6 +23,18 @@ bool has_side(const FaultType& fault, double side) {
   return (side > 0.0 ? fault.range.upper : -fault.range.lower) > 0.0;
 }
 
+// The parts of `all` (sides_of(faults)) that are each fault's.
+std::vector<std::span<FaultMargins>> by_fault(std::vector<FaultMargins>& all, std::span<const FaultType> faults) {
+  std::vector<std::span<FaultMargins>> parts;
+  std::size_t first = 0;
+  for (const FaultType& fault : faults) {
+    const std::size_t count = (has_side(fault, 1.0) ? 1 : 0) + (has_side(fault, -1.0) ? 1 : 0);
+    parts.emplace_back(all.data() + first, count);
+    first += count;
+  }
+  return parts;
+}
+
 }  // namespace
 
 std::vector<FaultMargins> sides_of(std::span<const FaultType> faults, std::size_t onsets) {
@@ -32,17 +47,6 @@ std::vector<FaultMargins> sides_of(std::span<const FaultType> faults, std::size_
     }
   }
   return all;
-}
-
-std::vector<std::span<FaultMargins>> by_fault(std::vector<FaultMargins>& all, std::span<const FaultType> faults) {
-  std::vector<std::span<FaultMargins>> parts;
-  std::size_t first = 0;
-  for (const FaultType& fault : faults) {
-    const std::size_t count = (has_side(fault, 1.0) ? 1 : 0) + (has_side(fault, -1.0) ? 1 : 0);
-    parts.emplace_back(all.data() + first, count);
-    first += count;
-  }
-  return parts;
 }
 
 std::size_t windows_within(const std::vector<double>& windows, double room) {
@@ -74,14 +78,14 @@ void SmallestCertain::offer(std::size_t onset, const SumSighting& sighting, cons
   }
 }
 
-void SmallestCertain::solve(FaultMargin& margin, const std::function<std::size_t(std::size_t onset)>& fit) {
+void SmallestCertain::solve(FaultMargin& margin, std::span<const std::size_t> fit) {
   for (std::size_t s = 0; s < sides_.size(); ++s) {
     FaultMargins& margins = sides_[s];
     const FaultType& fault = margins.fault;
     const double largest = std::abs(fault.kappa(margins.side * margins.largest()));
     for (std::size_t k = 0; k < margins.onsets.size(); ++k) {
       double smallest = kInfinity;
-      for (std::size_t w = 0; w < fit(k); ++w) {
+      for (std::size_t w = 0; w < fit[k]; ++w) {
         const Candidate& own = best(k, s, w);
         const double limit = std::min(smallest * (1.0 - 1e-9), largest);
         if (own.size < limit && fault.whole) {
@@ -94,6 +98,28 @@ void SmallestCertain::solve(FaultMargin& margin, const std::function<std::size_t
       }
     }
   }
+}
+
+void solve_smallest_certain(std::vector<FaultMargins>& margins, std::span<const FaultType> faults,
+                            const ThresholdRule& rule, const SumMarginOptions& options, std::string_view stage,
+                            std::span<const std::size_t> fit,
+                            const std::function<void(std::size_t fault, SmallestCertain&)>& look) {
+  check::that(!options.windows.empty() && options.windows.front() > 0.0 && std::ranges::is_sorted(options.windows),
+              "windows", "positive lengths in ascending order");
+  const std::vector<std::span<FaultMargins>> sides = by_fault(margins, faults);
+  core::for_all(
+      faults.size(), options.threads,
+      [&](std::size_t f) {
+        SmallestCertain smallest(sides[f], options.windows);
+        look(f, smallest);
+        FaultMargin margin(rule);
+        smallest.solve(margin, fit);
+      },
+      [&](std::size_t begun) {
+        if (options.progress) {
+          options.progress(stage, static_cast<double>(begun) / static_cast<double>(faults.size()));
+        }
+      });
 }
 
 }  // namespace wheelwright::detector

@@ -6,20 +6,18 @@
 #include <cstddef>
 #include <functional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/detector/margins.hpp>
+#include <wheelwright/detector/sum_margins.hpp>
 #include <wheelwright/detector/sum_response.hpp>
 
 namespace wheelwright::detector {
 
 /// `faults`, both sides where their range has two, a fault's sides one after the other, with room for `onsets`.
 [[nodiscard]] std::vector<FaultMargins> sides_of(std::span<const FaultType> faults, std::size_t onsets);
-
-/// The parts of `all` (sides_of(faults)) that are each fault's.
-[[nodiscard]] std::vector<std::span<FaultMargins>> by_fault(std::vector<FaultMargins>& all,
-                                                            std::span<const FaultType> faults);
 
 /// How many of `windows` (ascending) are no longer than `room`.
 [[nodiscard]] std::size_t windows_within(const std::vector<double>& windows, double room);
@@ -41,8 +39,8 @@ class SmallestCertain {
 
   /// A look after onset number `onset`; `row` is asked for where it promises more than those before.
   void offer(std::size_t onset, const SumSighting& sighting, const std::function<SumRow()>& row);
-  /// Writes OnsetMargin::certain of every side and onset, `fit` of which windows fit.
-  void solve(FaultMargin& margin, const std::function<std::size_t(std::size_t onset)>& fit);
+  /// Writes OnsetMargin::certain of every side and onset, `fit` (per onset) of which windows fit.
+  void solve(FaultMargin& margin, std::span<const std::size_t> fit);
 
  private:
   struct Candidate {
@@ -59,5 +57,12 @@ class SmallestCertain {
   const std::vector<double>& windows_;
   std::vector<Candidate> best_;
 };
+
+/// Solves all of `margins` (sides_of(faults)) over the set of `rule`, fault by fault: `look` offers what number `fault`
+/// shows, `fit` says per onset how many of SumMarginOptions::windows fit. `stage` is for its progress.
+void solve_smallest_certain(std::vector<FaultMargins>& margins, std::span<const FaultType> faults,
+                            const ThresholdRule& rule, const SumMarginOptions& options, std::string_view stage,
+                            std::span<const std::size_t> fit,
+                            const std::function<void(std::size_t fault, SmallestCertain&)>& look);
 
 }  // namespace wheelwright::detector

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include <wheelwright/core/check.hpp>
-#include <wheelwright/core/for_all.hpp>
 #include <wheelwright/detector/smallest_certain.hpp>
 
 namespace wheelwright::detector {
@@ -24,8 +23,6 @@ std::size_t windows_that_fit(const SumDrive& drive, const ReferenceMotion& motio
 std::vector<FaultMargins> margins_at_risk(const SumDrive& drive, const OnlineModel& model,
                                           const ReferenceMotion& motion, std::span<const FaultType> faults,
                                           std::span<const std::size_t> onsets, const SumMarginOptions& options) {
-  check::that(!options.windows.empty() && options.windows.front() > 0.0 && std::ranges::is_sorted(options.windows),
-              "windows", "positive lengths in ascending order");
   check::that(model.at_risk.has_value(), "model", "one that was learnt at a stated risk");
   std::vector<FaultMargins> all = sides_of(faults, onsets.size());
   for (FaultMargins& margins : all) {
@@ -34,33 +31,25 @@ std::vector<FaultMargins> margins_at_risk(const SumDrive& drive, const OnlineMod
       margins.onsets[k].t = motion.instant[onsets[k]];
     }
   }
-  const std::vector<std::span<FaultMargins>> sides = by_fault(all, faults);
-  const ThresholdRule rule(Polytope(model.at_risk->facets, model.at_risk->box), model.estimate);
-  core::for_all(
-      faults.size(), options.threads,
-      [&](std::size_t f) {
-        SmallestCertain smallest(sides[f], options.windows);
-        SumResponse response(faults[f], model, motion, drive);
-        response.walk(onsets, options.windows.back(), [&](const SumResponse::At& at) {
-          const SumLook& look = drive.looks[at.look];
-          smallest.offer(at.onset,
-                         {.since = look.t - motion.instant[onsets[at.onset]],
-                          .once = at.once,
-                          .twice = at.twice,
-                          .gap = look.width + 2.0 * look.radius,
-                          .channel = look.weight},
-                         [&] { return at.row(); });
-        });
-        FaultMargin margin(rule);
-        smallest.solve(margin,
-                       [&](std::size_t k) { return windows_that_fit(drive, motion, onsets[k], options.windows); });
-      },
-      [&](std::size_t begun) {
-        if (options.progress) {
-          options.progress("margins at the stated risk",
-                           static_cast<double>(begun) / static_cast<double>(faults.size()));
-        }
-      });
+  std::vector<std::size_t> fit;
+  for (const std::size_t onset : onsets) {
+    fit.push_back(windows_that_fit(drive, motion, onset, options.windows));
+  }
+  solve_smallest_certain(all, faults,
+                         ThresholdRule(Polytope(model.at_risk->facets, model.at_risk->box), model.estimate), options,
+                         "margins at the stated risk", fit, [&](std::size_t f, SmallestCertain& smallest) {
+                           SumResponse response(faults[f], model, motion, drive);
+                           response.walk(onsets, options.windows.back(), [&](const SumResponse::At& at) {
+                             const SumLook& look = drive.looks[at.look];
+                             smallest.offer(at.onset,
+                                            {.since = look.t - motion.instant[onsets[at.onset]],
+                                             .once = at.once,
+                                             .twice = at.twice,
+                                             .gap = look.width + 2.0 * look.radius,
+                                             .channel = look.weight},
+                                            [&] { return at.row(); });
+                           });
+                         });
   return all;
 }
 

@@ -181,12 +181,7 @@ SetCheck check_pose_at_risk(const KinematicClaims& claims, const SetCheck& guara
   wide.box = claims.hull;
   SetCheck result;
   try {
-    RegressionBlock rows = commission::pose_sum_rows(log, wide,
-                                                     {.errors = risk.errors,
-                                                      .scales = risk.scales,
-                                                      .delay = risk.delay,
-                                                      .risk = risk.risk,
-                                                      .learning = claims.learning});
+    RegressionBlock rows = commission::pose_sum_rows(log, wide, risk, claims.learning);
     for (std::size_t k = 0; k < rows.instants(); ++k) {
       rows.dy[static_cast<Eigen::Index>(k)] *= rows.sample[k] < claims.facets.size() ? 1.0 : 1.0 - kRounding;
     }
