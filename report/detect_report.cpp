@@ -153,8 +153,6 @@ std::string at_risk_section(const commission::RiskWatch& watch, const OnlineMode
              : out + table({"alarm", "until", "matched to", numeric("over, s"), numeric("times the threshold")}, rows);
 }
 
-const std::vector<detector::Isolation> kNoIsolations;
-
 }  // namespace
 
 std::string detect_report(const Detection& detection, const OnlineModel& model, const ReportContext& context,
@@ -184,9 +182,9 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   if (!at_risk.events.empty()) {
     content.sentences.push_back(core::capital(commission::sentence(at_risk.events.front(), model.model)) + ".");
   }
-  for (std::string& sentence : detect_words(detection, model, incidents.empty() ? isolations : kNoIsolations, axis)) {
-    content.sentences.push_back(std::move(sentence));
-  }
+  const std::vector<std::string> words =
+      detect_words(detection, model, incidents.empty() ? isolations : std::vector<detector::Isolation>(), axis);
+  content.sentences.insert(content.sentences.end(), words.begin(), words.end());
   if (kinematic_events > 0) {
     const detector::Event& first = kinematic.detection->events.front();
     content.sentences.push_back(fmt::format(

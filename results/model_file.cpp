@@ -331,9 +331,7 @@ ModelClaims claims_from_json(const Json& json, const std::string& file) {
   claims.model = model::make_model(claims.robot);
   claims.key = "feasible_set";
   claims.output_names = claims.model.outputs;
-  for (const model::Parameter& parameter : claims.model.parameters) {
-    claims.parameter_names.push_back(parameter.name);
-  }
+  claims.parameter_names = parameter_names(claims.model);
   claims.filter = robots::filter_at(root.at("filter"));
   claims.measurement = robots::measurement_at(root.at("measurement"), claims.model, claims.robot);
   read_noise(root.at("noise"), claims);

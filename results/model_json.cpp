@@ -57,6 +57,14 @@ Json error_classes_json(const filter::ErrorClasses& classes) {
           {"shortest_step", classes.shortest_step}};
 }
 
+std::vector<std::string> parameter_names(const Model& model) {
+  std::vector<std::string> names;
+  for (const model::Parameter& parameter : model.parameters) {
+    names.push_back(parameter.name);
+  }
+  return names;
+}
+
 Json origin_json(const bounds::RowOrigin& origin, const std::vector<std::string>& parameters,
                  const std::vector<std::string>& outputs) {
   if (origin.is_prior) {
@@ -84,14 +92,6 @@ Json proof_json(const std::vector<bounds::WeightedRow>& rows, const std::vector<
 namespace {
 
 constexpr std::size_t kMostVertices = 256;
-
-std::vector<std::string> parameter_names(const Model& model) {
-  std::vector<std::string> names;
-  for (const model::Parameter& parameter : model.parameters) {
-    names.push_back(parameter.name);
-  }
-  return names;
-}
 
 Json origin_json(const bounds::RowOrigin& origin, const Model& model) {
   return results::origin_json(origin, parameter_names(model), model.outputs);

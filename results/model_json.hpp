@@ -36,6 +36,9 @@ inline constexpr files::Words<bounds::Side, 2> kSideWords{
 /// What kinematic.at_risk calls the one output of its rows (commission::pose_sum_rows()).
 inline constexpr const char* kPoseSum = "pose";
 
+/// Names of θ's entries.
+[[nodiscard]] std::vector<std::string> parameter_names(const Model& model);
+
 /// Where a half-space comes from; names of parameters and outputs.
 [[nodiscard]] Json origin_json(const bounds::RowOrigin& origin, const std::vector<std::string>& parameters,
                                const std::vector<std::string>& outputs);

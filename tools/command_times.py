@@ -11,7 +11,6 @@ with a bias, so that everything is said at a stated risk, too). Run it on an idl
 
 import os
 import re
-import resource
 import statistics
 import subprocess
 import sys
@@ -76,7 +75,6 @@ def main():
     if len(sys.argv) not in (2, 3) or sys.argv[1].startswith("-"):
         sys.exit(__doc__.strip())
     program, runs = str(Path(sys.argv[1]).resolve()), int(sys.argv[2]) if len(sys.argv) > 2 else 3
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     table = {name: [] for name, _ in COMMANDS}
     for rate in RATES:
         with tempfile.TemporaryDirectory() as scratch:

@@ -22,19 +22,14 @@ namespace {
 using testing_support::drive;
 using testing_support::ExactUnicycle;
 using testing_support::known_kinematics;
+using testing_support::NamedUnicycle;
 using testing_support::PoseLaw;
 
 constexpr double kShare = 3e-3;       // of the parameters, that the set leaves
 constexpr std::uint64_t kMotion = 7;  // seed
 
-struct Named {
-  std::string name;
-  ExactUnicycle robot;
-};
-void PrintTo(const Named& n, std::ostream* out) { *out << n.name; }
-
-std::vector<Named> worlds() {
-  std::vector<Named> all;
+std::vector<NamedUnicycle> worlds() {
+  std::vector<NamedUnicycle> all;
   const auto add = [&](const std::string& name, auto change) {
     ExactUnicycle robot;
     robot.seconds = 30.0;
@@ -109,22 +104,34 @@ std::vector<double> onsets_of(const LogTable& log, std::size_t hold, const std::
   return onsets;
 }
 
-class PoseMargins : public ::testing::TestWithParam<Named> {};
+// What is asked of a robot's log: all that margins want.
+struct Asked {
+  KinematicModel model;
+  Model robot;
+  LogTable log;
+  PoseSumDrive seen;
+
+  Asked(const ExactUnicycle& nominal, double share)
+      : model(known_kinematics(nominal, share)), robot(model_of(nominal)), log(drive(nominal, kMotion)) {
+    TableSource source(log);
+    seen = read_pose_drive(source, model, PoseSumOptions{}.false_alarms);
+  }
+  [[nodiscard]] std::vector<FaultMargins> margins(const std::vector<double>& onsets,
+                                                  const std::vector<double>& windows) const {
+    SumMarginOptions options;
+    options.windows = windows;
+    return pose_margins_at_risk(seen, model, robot, faults_of(robot), onsets, options);
+  }
+};
+
+class PoseMargins : public ::testing::TestWithParam<NamedUnicycle> {};
 
 TEST_P(PoseMargins, AreSeenWithinTheirWindowWhateverTheErrors) {
   const ExactUnicycle& nominal = GetParam().robot;
-  const KinematicModel model = known_kinematics(nominal, kShare);
-  const Model robot = model_of(nominal);
-  const LogTable log = drive(nominal, kMotion);
-  const std::vector<double> onsets = onsets_of(log, nominal.hold, {5.0, 12.0, 18.0});
-  TableSource source(log);
-  const PoseSumDrive seen = read_pose_drive(source, model, PoseSumOptions{}.false_alarms);
-  SumMarginOptions options;
-  options.windows = {1.0, 3.0, 10.0};
-  const std::vector<FaultType> faults = faults_of(robot);
-  const std::vector<FaultMargins> margins = pose_margins_at_risk(seen, model, robot, faults, onsets, options);
+  const Asked asked(nominal, kShare);
+  const std::vector<double> onsets = onsets_of(asked.log, nominal.hold, {5.0, 12.0, 18.0}), windows{1.0, 3.0, 10.0};
   std::size_t tried = 0;
-  for (const FaultMargins& each : margins) {
+  for (const FaultMargins& each : asked.margins(onsets, windows)) {
     const auto which = std::ranges::find(kCases, each.fault.name, &Case::fault);
     for (std::size_t k = 0; k < onsets.size(); ++k) {
       const OnsetMargin& onset = each.onsets[k];
@@ -140,7 +147,7 @@ TEST_P(PoseMargins, AreSeenWithinTheirWindowWhateverTheErrors) {
           other.radius_left *= 1.0 + kShare * (seed == 4 ? -1.0 : 1.0);
           other.fault_at = onset.t;
           which->put(other, each.side * onset.certain[w] * (1.0 + 1e-6));
-          EXPECT_LE(alarm_after(drive(other, kMotion), model, onset.t), options.windows[w] + 1e-9)
+          EXPECT_LE(alarm_after(drive(other, kMotion), asked.model, onset.t), windows[w] + 1e-9)
               << each.fault.name << " of " << each.side * onset.certain[w] << " at " << onset.t << " s, errors "
               << seed;
           ++tried;
@@ -172,35 +179,20 @@ double seen_from(const ExactUnicycle& nominal, const KinematicModel& model, cons
 // Where the set is a point, certain is twice the radius, and seen is one radius give or take the errors.
 TEST(PoseMargins, AreNotMuchLargerThanWhatIsSeen) {
   const ExactUnicycle nominal = worlds().front().robot;
-  const KinematicModel model = known_kinematics(nominal, 0.0);
-  const Model robot = model_of(nominal);
-  const LogTable log = drive(nominal, kMotion);
-  TableSource source(log);
-  const PoseSumDrive seen = read_pose_drive(source, model, PoseSumOptions{}.false_alarms);
-  SumMarginOptions options;
-  options.windows = {3.0};
-  const std::vector<double> onsets = onsets_of(log, 1, {9.0});
-  for (const FaultMargins& each : pose_margins_at_risk(seen, model, robot, faults_of(robot), onsets, options)) {
+  const Asked asked(nominal, 0.0);
+  for (const FaultMargins& each : asked.margins(onsets_of(asked.log, 1, {9.0}), {3.0})) {
     const OnsetMargin& onset = each.onsets.front();
     ASSERT_TRUE(std::isfinite(onset.certain.front())) << each.fault.name;
     const auto which = std::ranges::find(kCases, each.fault.name, &Case::fault);
-    const double share = seen_from(nominal, model, *which, onset, each.side, onset.certain.front(), 3.0);
+    const double share = seen_from(nominal, asked.model, *which, onset, each.side, onset.certain.front(), 3.0);
     EXPECT_GT(share, 0.3) << each.fault.name;
     EXPECT_LT(share, 0.8) << each.fault.name;
   }
 }
 
 TEST(PoseMargins, SayNothingWhereTheLogEndsBeforeTheWindow) {
-  const ExactUnicycle nominal = worlds().front().robot;
-  const KinematicModel model = known_kinematics(nominal, 0.0);
-  const Model robot = model_of(nominal);
-  const LogTable log = drive(nominal, kMotion);
-  TableSource source(log);
-  const PoseSumDrive seen = read_pose_drive(source, model, PoseSumOptions{}.false_alarms);
-  SumMarginOptions options;
-  options.windows = {1.0, 10.0};
   const std::vector<double> onsets = {-5.0, 25.0, 29.5, 40.0};
-  const auto margins = pose_margins_at_risk(seen, model, robot, faults_of(robot), onsets, options);
+  const auto margins = Asked(worlds().front().robot, 0.0).margins(onsets, {1.0, 10.0});
   const std::vector<std::size_t> fit = {2, 1, 0, 0};
   for (std::size_t k = 1; k < onsets.size(); ++k) {
     EXPECT_EQ(margins.front().onsets[k].certain.size(), fit[k]) << onsets[k];

@@ -24,17 +24,12 @@ using testing_support::drive;
 using testing_support::ExactUnicycle;
 using testing_support::known_kinematics;
 using testing_support::most_failures;
+using testing_support::NamedUnicycle;
 using testing_support::PoseLaw;
 using testing_support::walk;
 
-struct Named {
-  std::string name;
-  ExactUnicycle robot;
-};
-void PrintTo(const Named& n, std::ostream* out) { *out << n.name; }
-
-std::vector<Named> worlds() {
-  std::vector<Named> all;
+std::vector<NamedUnicycle> worlds() {
+  std::vector<NamedUnicycle> all;
   const auto add = [&](const std::string& name, auto change) {
     ExactUnicycle robot;
     robot.seconds = 20.0;
@@ -83,7 +78,7 @@ std::size_t runs_with_alarm(const ExactUnicycle& robot, double share, std::size_
   return count;
 }
 
-class PoseSums : public ::testing::TestWithParam<Named> {};
+class PoseSums : public ::testing::TestWithParam<NamedUnicycle> {};
 
 TEST_P(PoseSums, RaiseNoMoreFalseAlarmsThanTheySay) {
   constexpr std::size_t kRuns = 30;

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ostream>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -14,6 +16,13 @@
 #include "support/exact_unicycle.hpp"
 
 namespace wheelwright::testing_support {
+
+/// A robot by name, for tests over many.
+struct NamedUnicycle {
+  std::string name;
+  ExactUnicycle robot;
+};
+inline void PrintTo(const NamedUnicycle& n, std::ostream* out) { *out << n.name; }
 
 /// How its log is read.
 inline filter::OdometryMeasurement reading_of(const ExactUnicycle& a) {
