@@ -192,14 +192,30 @@ bool Cutter::offer(const SlabColumns& columns, const std::vector<char>& used) {
 }
 
 /// Cuts in rows that were put aside until no corner violates any, and drops those that the box then implies.
+namespace {
+
+// Rounds of settle() from which rows are looked at for having been there: a corner whose linear program fails stays where
+// it was and asks for the same row for ever.
+constexpr std::size_t kManyRounds = 20;
+
+// Whether every row from `first` on is one of those before.
+bool repeats(const std::vector<HalfSpace>& rows, std::size_t first) {
+  const auto old = rows.begin() + static_cast<std::ptrdiff_t>(first);
+  return std::all_of(old, rows.end(), [&](const HalfSpace& row) {
+    return std::any_of(rows.begin(), old, [&](const HalfSpace& each) { return each.origin == row.origin; });
+  });
+}
+
+}  // namespace
+
 bool Cutter::settle(Part& part, std::size_t which) {
-  while (part.aside.size() > 0) {
+  for (std::size_t round = 1; part.aside.size() > 0; ++round) {
     const SlabColumns rows = part.aside.view();
     const std::size_t before = part.planes->rows().size();
     if (!take(part, which, rows, search(part, rows, true)) || !tighten(part)) {
       return false;
     }
-    if (part.planes->rows().size() <= before) {
+    if (part.planes->rows().size() <= before || (round > kManyRounds && repeats(part.planes->rows(), before))) {
       break;
     }
     if (passed_over_) {
