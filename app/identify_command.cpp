@@ -50,11 +50,11 @@ constexpr const char* kExamples =
     "  wheelwright identify monday.csv tuesday.csv.gz --robot robot.yaml --json > identification.json\n\n"
     "Exit code: 0 the log shows parameters (or kinematics), 1 it shows none, 2 bad input.";
 
-// Wheel speeds and a pose, and no effort at all.
+// Motion of both wheels and a pose, and no effort at all.
 bool for_kinematics_only(const LogSource& log, const Robot& robot) {
   const std::vector<std::string> needed = robots::needed_columns(robot);
   const bool effort = std::ranges::any_of(needed, [&](const std::string& name) { return log.find(name).has_value(); });
-  return !effort && model::on_two_wheels(robot) && log.find("theta") && log.find("omega_r") && log.find("omega_l");
+  return !effort && inference::shows_kinematics(log, robot);
 }
 
 int run(const Arguments& a) {

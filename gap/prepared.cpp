@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -176,6 +177,90 @@ NoiseFloor together(const NoiseFloor& a, const NoiseFloor& b) {
   return sum;
 }
 
+// A fit of θ and of effects to the rows of a drive.
+struct BaselineFit {
+  GapProblem problem;
+  Subset subset;
+  BlockFit fit;
+};
+
+// Columns of effects grow with θ: those of the first fit are of the θ that it corrects. Fits what was found again about
+// itself until it stays, so that another drive, whose columns are made of the final θ, finds the same robot.
+void settle(PreparedGap& prepared, const NoiseFloor& sensors, const BlockOptions& blocks, BaselineFit& last) {
+  constexpr int rounds = 30;
+  constexpr double enough = 1e-6;  // of each parameter
+  Drive& drive = *prepared.healthy_drive;
+  for (int round = 0; round < rounds && drive.has_efforts && !prepared.healthy.empty(); ++round) {
+    predict_efforts(drive, prepared.theta);
+    ShapeGrids shapes(prepared.catalogue.size());
+    std::vector<FittedEffect*> fitted(prepared.catalogue.size(), nullptr);
+    for (FittedEffect& effect : prepared.healthy) {
+      const auto e = static_cast<std::size_t>(std::ranges::find_if(prepared.catalogue,
+                                                                   [&](const Effect& each) {
+                                                                     return each.name == effect.effect.name &&
+                                                                            each.sentence == effect.effect.sentence;
+                                                                   }) -
+                                              prepared.catalogue.begin());
+      if (effect.coefficients.size() > 0) {
+        shapes[e] = {effect.shape};
+        fitted[e] = &effect;
+      }
+    }
+    BaselineFit next{make_problem(drive, sensors, prepared.healthy, std::vector<bool>(drive.model.p(), false),
+                                  prepared.catalogue, shapes, prepared.row_options),
+                     {},
+                     {}};
+    const CandidateTable& table = next.problem.table;
+    std::vector<std::size_t> all(table.candidates.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    next.subset = subset_of(table, all, BaseModel::refitted);
+    const auto effect_of = [&](std::size_t c) { return fitted[table.candidates[c].effect]; };
+    // A coefficient may go either way, unless it is at its bound already.
+    std::size_t at = table.base.size();
+    for (const std::size_t c : all) {
+      for (const double value : effect_of(c)->coefficients) {
+        int& sign = next.subset.sign[at++];
+        sign = value == 0.0 ? sign : 0;
+      }
+    }
+    const BlockGram gram(next.problem.rows.spaces, blocks);
+    next.fit = gram.fit(next.subset);
+    const auto p = prepared.theta.size();
+    double largest = 0.0;
+    for (Eigen::Index j = 0; j < p; ++j) {
+      largest = std::max(largest, std::abs(next.fit.coefficients[j]) / std::max(std::abs(prepared.theta[j]), 1e-300));
+    }
+    prepared.theta += next.fit.coefficients.head(p);
+    Eigen::Index from = p;
+    for (const std::size_t c : all) {
+      Eigen::VectorXd& coefficients = effect_of(c)->coefficients;
+      coefficients += next.fit.coefficients.segment(from, coefficients.size());
+      from += coefficients.size();
+    }
+    last = std::move(next);
+    if (largest < enough) {
+      return;
+    }
+  }
+}
+
+// What to write into the robot file, so that a large slip in turns is not left to effects of first order; else empty.
+std::string track_hint(const FittedEffect& effect, const Drive& drive) {
+  if (effect.effect.name != "turning_slip" || !effect.effect.physical) {
+    return "";
+  }
+  const std::vector<double> coefficients(effect.coefficients.begin(), effect.coefficients.end());
+  for (const PhysicalValue& value : effect.effect.physical(coefficients, effect.shape)) {
+    if (value.name == "track_in_effect" && value.value > 1.02) {
+      return fmt::format(
+          "; it turns as a track of {0:.3g} m would have it: with `track_width: {0:.3g}` in the robot file, what else "
+          "there is shows more sharply",
+          value.value * drive.track_width);
+    }
+  }
+  return "";
+}
+
 // θ, floor and effects of the healthy robot, or of the simulator.
 void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   Drive& drive = *prepared.healthy_drive;
@@ -205,17 +290,19 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   const BlockFit fit = gram.fit(subset);
   prepared.theta += fit.coefficients.head(prepared.theta.size());
   prepared.healthy = fitted_effects(problem.table, found.structural, fit, prepared.catalogue);
-  std::vector<Eigen::VectorXd> left = residuals(problem.rows, subset, fit.coefficients);
-  const FittedEffect timing = timing_of(drive, problem.rows, left, prepared.row_options);
+  BaselineFit last{std::move(problem), subset, fit};
+  settle(prepared, sensors, blocks, last);
+  std::vector<Eigen::VectorXd> left = residuals(last.problem.rows, last.subset, last.fit.coefficients);
+  const FittedEffect timing = timing_of(drive, last.problem.rows, left, prepared.row_options);
   // Held out, as the errors of other logs are that are measured by it.
-  const double held_out = std::sqrt(std::max(fit.held_out_error / std::max(fit.mean_square, 1e-300), 1.0));
+  const double held_out = std::sqrt(std::max(last.fit.held_out_error / std::max(last.fit.mean_square, 1e-300), 1.0));
   for (Eigen::VectorXd& rows : left) {
     rows *= held_out;
   }
-  const NoiseFloor floor = without_efforts(floor_of(left, problem.rows), drive);
+  const NoiseFloor floor = without_efforts(floor_of(left, last.problem.rows), drive);
   for (const FittedEffect& effect : prepared.healthy) {
     prepared.notes.push_back((simulated ? "the simulator has " : "the healthy log shows ") + effect.effect.name +
-                             " already: what is reported is in addition to it");
+                             " already: what is reported is in addition to it" + track_hint(effect, drive));
   }
   if (simulated) {
     prepared.floor = together(floor, prepared.floor);

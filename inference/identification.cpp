@@ -330,8 +330,25 @@ void find_shapes(LogSource& log, const commission::Setting& s, const commission:
   }
 }
 
-bool shows_kinematics(const LogSource& log, const Robot& robot) {
-  return model::on_two_wheels(robot) && log.find("theta") && log.find("omega_r") && log.find("omega_l");
+// Adds wheel speeds where there are angles in their place: the mean speed from the sample before to the one behind.
+void add_speeds(LogTable& log) {
+  for (const auto& [speed, angle] : {std::pair("omega_r", "phi_r"), std::pair("omega_l", "phi_l")}) {
+    if (std::ranges::find(log.names, speed) != log.names.end()) {
+      continue;
+    }
+    const std::vector<double>& phi = log.column(angle);
+    std::vector<double> omega(log.rows(), 0.0);
+    for (std::size_t s = 0; s < log.segment_starts.size(); ++s) {
+      const std::size_t first = log.segment_starts[s];
+      const std::size_t last = (s + 1 < log.segment_starts.size() ? log.segment_starts[s + 1] : log.rows()) - 1;
+      for (std::size_t k = first; k <= last && first < last; ++k) {
+        const std::size_t before = std::max(k, first + 1) - 1, behind = std::min(k + 1, last);
+        omega[k] = (phi[behind] - phi[before]) / (log.t[behind] - log.t[before]);
+      }
+    }
+    log.names.emplace_back(speed);
+    log.columns.push_back(std::move(omega));
+  }
 }
 
 bool has_effort(const LogSource& log, const Robot& robot, const Model& model) {
@@ -350,7 +367,9 @@ void calibrate(LogSource& log, const Robot& robot, Identification& result) {
   const bool position = log.find("x").has_value() && log.find("y").has_value();
   options.radius = options.axle_offset = position;
   try {
-    result.kinematics = calibrate_kinematics(read_all(log), options);
+    LogTable table = read_all(log);
+    add_speeds(table);
+    result.kinematics = calibrate_kinematics(table, options);
   } catch (const InvalidArgument& error) {
     result.notes.push_back(fmt::format("the kinematics were not calibrated: {}", error.what()));
   }
@@ -358,6 +377,13 @@ void calibrate(LogSource& log, const Robot& robot, Identification& result) {
 }
 
 }  // namespace
+
+bool shows_kinematics(const LogSource& log, const Robot& robot) {
+  const auto either = [&](const char* speed, const char* angle) {
+    return log.find(speed).has_value() || log.find(angle).has_value();
+  };
+  return model::on_two_wheels(robot) && log.find("theta") && either("omega_r", "phi_r") && either("omega_l", "phi_l");
+}
 
 Identification identify(LogSource& log, const Robot& robot, const IdentificationOptions& options) {
   check::that(options.curve_points >= 2, "curve_points", "at least 2");

@@ -131,7 +131,10 @@ struct Identification {
   std::vector<std::string> notes;                  ///< what was assumed, left out or could not be done
 };
 
-/// Identifies on the whole of `log`, in several walks. A log of wheel speeds and pose without efforts gives kinematics
+/// True if `log` has the motion of both wheels, as speeds or as angles, and a heading to calibrate them by.
+[[nodiscard]] bool shows_kinematics(const LogSource& log, const Robot& robot);
+
+/// Identifies on the whole of `log`, in several walks. A log of wheel motion and pose without efforts gives kinematics
 /// only. Throws InputError or InvalidArgument for a log or robot that cannot be used at all.
 [[nodiscard]] Identification identify(LogSource& log, const Robot& robot, const IdentificationOptions& options = {});
 
