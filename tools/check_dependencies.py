@@ -82,7 +82,7 @@ def cmake_files(root):
     folders = [path for path in root.iterdir() if path.is_dir() and not path.name.startswith((".", "build"))
                and path.name not in ("node_modules", "out")]
     files = [path for folder in folders for pattern in ("*.cmake", "CMakeLists.txt") for path in folder.rglob(pattern)]
-    return [root / "CMakeLists.txt"] + sorted(path for path in files if "consumer" not in path.parts)
+    return [root / "CMakeLists.txt"] + sorted(path for path in files if not {"consumer", "ros2"} & set(path.parts))
 
 
 def setup_packages(text):
