@@ -5,9 +5,10 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/results/check_words.hpp>
+#include <wheelwright/results/model_check.hpp>
 #include <wheelwright/results/model_file.hpp>
 
-#include <wheelwright/results/model_check.hpp>
 #include "check_report.hpp"
 #include "commands.hpp"
 #include "common.hpp"
@@ -58,7 +59,7 @@ int run(const Arguments& a) {
             check_report(check, claims, files, results::software()));
   }
   if (!a.common.quiet && !a.common.json) {
-    say("{}", check_summary(check, claims));
+    say("{}", results::check_summary(check, claims));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "check.json").string(), (a.common.out / "report.html").string());
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Result of a model check for a terminal and as a page.
+/// Result of a model check as a page.
 #pragma once
 
 #include <string>
@@ -9,10 +9,7 @@
 
 namespace wheelwright::app {
 
-/// The answer, a short table and what is not proved, for a terminal.
-[[nodiscard]] std::string check_summary(const results::ModelCheck& check, const results::ModelClaims& claims);
-
-/// The same as one self-contained HTML page.
+/// The check of a model as one self-contained HTML page.
 [[nodiscard]] std::string check_report(const results::ModelCheck& check, const results::ModelClaims& claims,
                                        const results::CheckedFiles& files, const std::string& software);
 

@@ -10,11 +10,11 @@
 
 #include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/report/commission_report.hpp>
+#include <wheelwright/report/choice_report.hpp>
 #include <wheelwright/results/detection_json.hpp>
 #include <wheelwright/results/model_file.hpp>
 #include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/words/detect_words.hpp>
+#include <wheelwright/words/summary.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
@@ -62,68 +62,6 @@ commission::StatedFault stated(const std::string& text) {
   return fault;
 }
 
-std::string shown(double value, const char* form) {
-  return std::isfinite(value) ? fmt::format(fmt::runtime(form), value) : "-";
-}
-
-const char* words(commission::Guarantee guarantee) {
-  switch (guarantee) {
-    case commission::Guarantee::never: return "never";
-    case commission::Guarantee::hourly: return "hourly";
-    case commission::Guarantee::extrapolated: return "extrapol.";
-  }
-  return "";
-}
-
-std::string cost(const commission::DetectorCandidate& candidate, const commission::DetectorCandidate& chosen) {
-  if (!std::isfinite(candidate.size)) {
-    return "not certain";
-  }
-  std::string text = fmt::format("size {:+.1f} %", 100.0 * (candidate.size / chosen.size - 1.0));
-  if (std::isfinite(candidate.delay) && std::isfinite(chosen.delay)) {
-    text += fmt::format(", delay {:+.3f} s", candidate.delay - chosen.delay);
-  }
-  return text;
-}
-
-std::string table(const commission::DetectorChoice& choice) {
-  // Once is enough where it is the same for all.
-  const bool differs = choice.risk_spread.value_or(0.0) > choice.tie;
-  std::string out = fmt::format(
-      "smallest certain size over the stated one{}, within {:g} s, and delay of the stated size: medians, worst fault\n"
-      "{:>5} {:>8} {:>10} {:>7} {:>8} {:>8}{}  {}\n",
-      choice.either ? ", by whichever guarantee sees a fault first" : "", choice.window, "order", "beta", "alarms",
-      "k of n", "size", "delay", differs ? "  at risk" : "", "against the chosen one");
-  const commission::DetectorCandidate& chosen = choice.candidates.front();
-  for (const commission::DetectorCandidate& candidate : choice.candidates) {
-    out +=
-        fmt::format("{:>5} {:>8.4g} {:>10} {:>7} ", candidate.filter.order, candidate.filter.beta,
-                    words(candidate.guarantee), fmt::format("{}/{}", candidate.persistence.k, candidate.persistence.n));
-    if (!candidate.failure.empty()) {
-      out += fmt::format("no detector: {}\n", candidate.failure);
-      continue;
-    }
-    const std::string note =
-        candidate.origin == "grid" || candidate.origin == "refined" ? "" : " (" + candidate.origin + ")";
-    out += fmt::format(
-        "{:>8} {:>8}{}  {}{}\n", shown(candidate.size, "{:.3f}"), shown(candidate.delay, "{:.3f}"),
-        differs ? fmt::format(" {:>8}", candidate.size_at_risk ? shown(*candidate.size_at_risk, "{:.3f}") : "") : "",
-        &candidate == &chosen && choice.chosen ? "chosen" : cost(candidate, chosen), note);
-  }
-  return out;
-}
-
-std::string faults(const commission::DetectorChoice& choice) {
-  std::string out;
-  for (const commission::StatedMargin& m : choice.candidates.front().faults) {
-    out +=
-        fmt::format("{} {}: certain from {} on at half of {} onsets, from {} at all; one of {:g} after {}\n", m.fault,
-                    m.side > 0.0 ? "growing" : "shrinking", shown(m.median, "{:.3g}"), m.onsets,
-                    shown(m.worst, "{:.3g}"), m.asked, std::isfinite(m.delay) ? fmt::format("{:g} s", m.delay) : "-");
-  }
-  return out;
-}
-
 int run(const Arguments& a) {
   commission::DetectorChoiceOptions options = a.choice;
   for (const std::string& text : a.faults) {
@@ -152,27 +90,14 @@ int run(const Arguments& a) {
       report::ReportContext context = report_context(a.common, log.report(), log);
       context.seen = commission::first_look(log, choice.chosen->model);
       publish(files, results::to_json(*choice.chosen, log.report(), results::software()), "model.json",
-              report::commission_report(*choice.chosen, context));
+              report::choice_report(choice, context));
     }
     files::write_json(a.common.out / "choice.json", json);
   }
   if (a.common.json) {
     say_json(json);
   } else if (!a.common.quiet) {
-    say("{}", table(choice));
-    say("{}", faults(choice));
-    for (const std::string& sentence : words::choice_sentences(choice)) {
-      say("{}\n", sentence);
-    }
-    for (const std::string& name : choice.hopeless) {
-      say("does not count: no candidate is certain to see {} at half of the onsets\n", name);
-    }
-    for (const std::string& note : choice.notes) {
-      say("{}\n", note);
-    }
-    if (choice.chosen) {
-      say("for the robot file:\n{}\n", results::robot_file_line(choice.candidates.front().filter));
-    }
+    say("{}", words::summary(choice, choice.chosen ? results::robot_file_line(choice.candidates.front().filter) : ""));
   }
   return choice.chosen ? kDone : kNo;
 }

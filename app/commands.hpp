@@ -23,6 +23,8 @@ using Run = std::function<int(const std::string& command_line)>;
 [[nodiscard]] Run add_commission(CLI::App& program);
 /// wheelwright completion bash|zsh|fish
 [[nodiscard]] Run add_completion(CLI::App& program);
+/// wheelwright compare BEFORE AFTER
+[[nodiscard]] Run add_compare(CLI::App& program);
 /// wheelwright convert IN... OUT
 [[nodiscard]] Run add_convert(CLI::App& program);
 /// wheelwright design --model model.json --for bounds

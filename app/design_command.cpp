@@ -14,6 +14,7 @@
 #include <wheelwright/gap/discrimination_design.hpp>
 #include <wheelwright/gap/effect.hpp>
 #include <wheelwright/gap/further_drive.hpp>
+#include <wheelwright/gap/named_rivals.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/report/design_report.hpp>
 #include <wheelwright/results/gap_json.hpp>
@@ -24,8 +25,8 @@
 #include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
+#include "drive_files.hpp"
 #include "options.hpp"
-#include "rivals.hpp"
 #include "units.hpp"
 
 namespace wheelwright::app {
@@ -49,6 +50,9 @@ struct Arguments {
   CommonOptions common;
 };
 
+constexpr const char* kManoeuvre = "manoeuvre";
+constexpr const char* kFigureEight = "figure_eight.csv";
+
 constexpr const char* kHelp =
     "Designs a drive within limits of speed, acceleration, effort, space and time, and writes it as a table of "
     "wheel-speed commands: for the narrowest bounds on the parameters (bounds), or as an inspection that is "
@@ -70,7 +74,9 @@ constexpr const char* kExamples =
     "  wheelwright design --robot robot.yaml --for discrimination --gap gap/gap.json --out plan\n"
     "  wheelwright design --robot robot.yaml --for discrimination --between coulomb --between caster_drag --size "
     "coulomb=0.2\n"
-    "  then drive plan/manoeuvre.csv, or simulate it with trajectory: {kind: table, file: plan/manoeuvre.csv}";
+    "  then drive plan/manoeuvre.csv (speeds of the wheels), or let the robot's controller drive it:\n"
+    "  ros2 bag play plan/manoeuvre_cmd_vel.mcap (TwistStamped on /cmd_vel, Twist on /cmd_vel_unstamped);\n"
+    "  or simulate it with trajectory: {kind: table, file: plan/manoeuvre.csv}";
 
 design::MotionLimits limits_from(const Arguments& a, const Robot& robot) {
   design::MotionLimits limits = design::limits_of(robot);
@@ -146,12 +152,12 @@ std::vector<design::InspectedFault> inspected(const Arguments& a, const OnlineMo
   return faults.empty() ? usual : faults;
 }
 
-void write_plans(const Arguments& a, const Model& model, const design::Plan& plan,
+void write_plans(const Arguments& a, const design::DesignSubject& subject, const design::Plan& plan,
                  const std::optional<design::Plan>& eight) {
   if (!a.common.out.empty()) {
-    logs::write_csv(a.common.out / "manoeuvre.csv", design::command_table(plan, model));
+    write_drive(a.common.out, kManoeuvre, design::command_table(plan, subject.model), subject.robot);
     if (eight) {
-      logs::write_csv(a.common.out / "figure_eight.csv", design::command_table(*eight, model));
+      logs::write_csv(a.common.out / kFigureEight, design::command_table(*eight, subject.model));
     }
   }
 }
@@ -160,8 +166,12 @@ void tell(const Arguments& a, const std::string& summary) {
   if (!a.common.quiet && !a.common.json) {
     say("{}", summary);
     if (!a.common.out.empty()) {
-      say("wrote {} (commands to drive), design.json and report.html beside it\n",
-          (a.common.out / "manoeuvre.csv").string());
+      say("wrote {} (speeds of the wheels to drive), design.json and report.html beside it\n",
+          (a.common.out / drive_files(kManoeuvre).front()).string());
+      if (std::filesystem::exists(a.common.out / drive_files(kManoeuvre).back())) {
+        say("  to drive it through the robot's controller: ros2 bag play {}\n",
+            (a.common.out / drive_files(kManoeuvre).back()).string());
+      }
     }
   }
 }
@@ -178,24 +188,30 @@ void check_rivals(const Arguments& a) {
   }
 }
 
-// A drive with a bit of everything, on which sizes that nobody gave are found.
-gap::Drive ordinary_drive(const design::DesignSubject& subject, const design::MotionLimits& limits) {
-  const design::StageFamily family(subject, limits, 2);
-  std::vector<double> x(family.dimension(), 0.5);
-  x[0] = 1.0;
-  x[1] = x.size() > 4 ? 1.0 : 0.5;
-  x[family.dimension() / 2] = x.size() > 4 ? 1.0 : 0.0;
-  x[family.dimension() / 2 + 1] = x.size() > 4 ? 0.0 : 0.5;
-  return gap::planned_drive(family.plan(x, subject.step), subject);
+// EFFECT[.PARAMETER]=VALUE.
+std::vector<gap::NamedSize> sizes_from(const std::vector<std::string>& texts) {
+  std::vector<gap::NamedSize> sizes;
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos) {
+      throw InputError("--size " + text + ": expected EFFECT=VALUE or EFFECT.PARAMETER=VALUE");
+    }
+    sizes.push_back(
+        {text.substr(0, equals),
+         [text, equals](const std::string& unit) { return quantity(text.substr(equals + 1), unit, "--size " + text); },
+         "--size " + text});
+  }
+  return sizes;
 }
 
 gap::DiscriminationDesign discriminate(const Arguments& a, const design::DesignSubject& subject,
                                        const design::MotionLimits& limits, const design::DesignOptions& options) {
   std::vector<Effect> catalogue = gap::effect_catalogue(subject.model);
-  const gap::Drive drive = ordinary_drive(subject, limits);
+  const gap::Drive drive = gap::ordinary_drive(subject, limits);
   gap::PlannedNoise noise = gap::expected_noise(subject);
-  const std::vector<gap::Rival> rivals = a.gap.empty() ? rivals_named(a.between, a.sizes, catalogue, drive)
-                                                       : results::rivals_of_gap(a.gap, catalogue, drive, noise);
+  const std::vector<gap::Rival> rivals =
+      a.gap.empty() ? gap::rivals_named(a.between, "--between ", sizes_from(a.sizes), catalogue, drive)
+                    : results::rivals_of_gap(a.gap, catalogue, drive, noise);
   return gap::design_for_discrimination(subject, limits, rivals, catalogue, noise, options);
 }
 
@@ -214,7 +230,11 @@ int run(const Arguments& a) {
     throw InputError("--guarantee at-risk: expected --for bounds or detection; telling causes apart is statistical");
   }
   check_rivals(a);
-  make_directory(a.common, {"design.json", "manoeuvre.csv", "figure_eight.csv"});
+  std::vector<std::string> written = {"design.json", kFigureEight};
+  for (const std::string& file : drive_files(kManoeuvre)) {
+    written.push_back(file);
+  }
+  make_directory(a.common, written);
   const std::optional<OnlineModel> model = a.model.empty() ? std::nullopt : std::optional(read_model(a.model));
   design::DesignSubject subject = subject_of(a, model);
   if (a.guarantee == design::Promise::at_risk && !subject.averaging) {
@@ -242,7 +262,7 @@ int run(const Arguments& a) {
     result["software"] = results::software();
     result["seed"] = a.common.seed;
     result["warrant"] = core::warrant_word(subject.warrant);
-    write_plans(a, subject.model, design.manoeuvre.plan, design.figure_eight_plan);
+    write_plans(a, subject, design.manoeuvre.plan, design.figure_eight_plan);
     publish(a.common, result, "design.json", report::design_report(design, subject, limits, context));
     tell(a, words + fmt::format("  these promises are {}\n", core::warrant_word(subject.warrant)));
   };

@@ -23,6 +23,7 @@
 #include "follow.hpp"
 #include "options.hpp"
 #include "series.hpp"
+#include "units.hpp"
 
 namespace wheelwright::app {
 using namespace words;
@@ -33,6 +34,8 @@ struct Arguments {
   std::filesystem::path log;
   std::filesystem::path model;
   std::filesystem::path series;
+  bool layouts = false;
+  double heartbeat = 0.0;
   bool follow = false;
   detector::DetectorOptions detector;
   std::optional<detector::Persistence> persistence;
@@ -47,12 +50,12 @@ constexpr const char* kHelp =
 constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright detect drive.csv --model result/model.json --out check\n"
-    "  wheelwright detect drive.mcap --model result/model.json --series residual.mcap\n"
+    "  wheelwright detect drive.mcap --model result/model.json --series residual.mcap --layouts\n"
     "  robot_driver | wheelwright detect --follow --model result/model.json\n\n"
     "Exit code: 0 no fault, 1 a fault was found, 2 bad input, or it could not be decided: at no instant, at fewer "
     "than\n"
     "half of the rows, or, with --follow, at none of the last ones. --follow tells such spells as they come (blind),\n"
-    "and when no row has come for 5 s (silent).";
+    "and when no row has come for 5 s (silent). With --out they are appended to DIR/events.jsonl, too.";
 
 // Why the log as a whole is not decided; empty where it is: all but what the filter settles in, or half of it.
 std::string why_not_decided(const Detection& detection, const OnlineModel& model, const logs::RecordedLog& log) {
@@ -67,6 +70,36 @@ std::string why_not_decided(const Detection& detection, const OnlineModel& model
              : std::string();
 }
 
+// Files that --series and --layouts may write.
+std::vector<std::filesystem::path> series_files(const Arguments& a, const OnlineModel& model) {
+  std::vector<std::filesystem::path> files;
+  if (!a.series.empty()) {
+    files.push_back(a.series);
+    if (model.kinematic) {
+      files.push_back(kinematic_series(a.series));
+    }
+    if (a.layouts) {
+      for (std::filesystem::path& file : layout_files(a.series)) {
+        files.push_back(std::move(file));
+      }
+    }
+  }
+  return files;
+}
+
+void write_all_series(const Arguments& a, logs::RecordedLog& log, const OnlineModel& model, bool kinematic) {
+  const double origin = log.report().files.front().time_origin;
+  std::vector<Series> series = {write_series(a.series, log, model, a.detector, origin)};
+  if (kinematic) {
+    series.push_back(write_series(kinematic_series(a.series), log, *model.kinematic, a.detector, origin));
+  }
+  if (a.layouts) {
+    const std::vector<std::filesystem::path> files = layout_files(a.series);
+    files::atomic_write(files[0], plotjuggler_layout(series));
+    files::atomic_write(files[1], foxglove_layout(series));
+  }
+}
+
 int run(const Arguments& a) {
   OnlineModel model = read_model(a.model);
   model.persistence = a.persistence.value_or(model.persistence);
@@ -77,13 +110,24 @@ int run(const Arguments& a) {
   logs::LogOptions reader = reader_options(a.common);
   reader.only = robots::useful_columns(model.robot);
   if (a.follow) {
-    return follow(STDIN_FILENO, std::cout, std::move(detector), model, a.detector, reader, a.common.json);
+    FollowOptions how{.json = a.common.json, .heartbeat = a.heartbeat, .events = {}};
+    if (!a.common.out.empty()) {
+      make_directory(a.common);
+      how.events = a.common.out / "events.jsonl";
+      keep_existing(a.common, how.events, kEventsSchema);
+    }
+    return follow(STDIN_FILENO, std::cout, std::move(detector), model, a.detector, reader, how);
   }
   if (a.log.empty()) {
     throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
   }
-  keep_inputs(a.series, {a.log, a.model});
-  keep_existing(a.common, a.series);
+  if (a.layouts && a.series.empty()) {
+    throw InputError("--layouts: expected --series FILE, which they show");
+  }
+  for (const std::filesystem::path& file : series_files(a, model)) {
+    keep_inputs(file, {a.log, a.model});
+    keep_existing(a.common, file);
+  }
   make_directory(a.common, {"detection.json"});
   const auto opened = logs::open_log({a.log}, reader);
   logs::RecordedLog& log = *opened;
@@ -124,7 +168,7 @@ int run(const Arguments& a) {
     publish(a.common, json, "detection.json", page);
   }
   if (!a.series.empty()) {
-    write_series(a.series, log, model, a.detector, log.report().files.front().time_origin);
+    write_all_series(a, log, model, kinematic.detection.has_value());
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
@@ -133,7 +177,11 @@ int run(const Arguments& a) {
       say("wrote {} and {}\n", (a.common.out / "detection.json").string(), (a.common.out / "report.html").string());
     }
     if (!a.series.empty()) {
-      say("wrote {}\n", a.series.string());
+      for (const std::filesystem::path& file : series_files(a, model)) {
+        if (std::filesystem::exists(file)) {
+          say("wrote {}\n", file.string());
+        }
+      }
     }
   }
   if (!undecided.empty()) {
@@ -153,11 +201,21 @@ Run add_detect(CLI::App& program) {
   command.add_option("--model", a->model, "model.json of `wheelwright commission`")->required()->type_name("FILE");
   command.add_flag("--follow", a->follow, "Read CSV rows from standard input as they come, tell events at once");
   command
+      .add_option("--heartbeat", a->heartbeat,
+                  "With --follow: say every S seconds of the rows' time that it is watching; 0: never")
+      ->transform(in_unit("s"))
+      ->type_name("S")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
       .add_option(
           "--series", a->series,
           "Write residual, thresholds and decisions over time into FILE (.csv, .mcap, .db3, .h5), for PlotJuggler, "
-          "Foxglove and the like")
+          "Foxglove and the like; those of the kinematic residual into a second file, FILE with _kinematic in its name")
       ->type_name("FILE");
+  command.add_flag("--layouts", a->layouts,
+                   "Write layouts of PlotJuggler and Foxglove that show the --series, beside it (FILE.plotjuggler.xml, "
+                   "FILE.foxglove.json)");
   add_set(command, a->detector.set);
   add_test(command, a->detector.test);
   add_persistence(command, a->persistence, "the model's");

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <memory>
 #include <optional>
 
@@ -11,11 +10,11 @@
 #include <wheelwright/report/health_report.hpp>
 #include <wheelwright/results/health_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
+#include <wheelwright/words/summary.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
-#include "sound_log.hpp"
 
 namespace wheelwright::app {
 namespace doctor_command {
@@ -43,73 +42,12 @@ constexpr const char* kExamples =
     "  wheelwright doctor drive.csv --robot robot.yaml --all             # also what is as it should be\n\n"
     "Exit code: 0 the log can be commissioned, 1 it cannot or should not be as it stands, 2 bad input.";
 
-std::string stretches(const doctor::LogFinding& finding) {
-  if (finding.when.empty()) {
-    return {};
-  }
-  constexpr std::size_t kShown = 4;
-  std::string text = "at t = ";
-  for (std::size_t k = 0; k < std::min(kShown, finding.when.size()); ++k) {
-    text += fmt::format("{}{:.5g} to {:.5g} s", k > 0 ? ", " : "", finding.when[k].lower, finding.when[k].upper);
-  }
-  return finding.stretches > kShown ? text + fmt::format(" and {} more", finding.stretches - kShown) : text;
-}
-
-// `text` in lines of at most `width` bytes, each behind `indent`.
-std::string wrapped(const std::string& text, const std::string& indent, std::size_t width = 100) {
-  std::string out;
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    std::size_t end = text.size();
-    if (end - begin > width) {
-      end = text.rfind(' ', begin + width);
-      end = end == std::string::npos || end <= begin ? text.find(' ', begin + width) : end;
-      end = std::min(end, text.size());
-    }
-    out += indent + text.substr(begin, end - begin) + "\n";
-    begin = end + 1;
-  }
-  return out;
-}
-
-void tell(const doctor::LogHealth& health, bool all) {
-  for (const doctor::LogFinding& finding : health.findings) {
-    if (finding.severity == doctor::FindingSeverity::fine && !all) {
-      continue;
-    }
-    say("{}: {}\n{}", doctor::to_string(finding.severity), finding.id, wrapped(finding.sentence, "  "));
-    if (const std::string when = stretches(finding); !when.empty()) {
-      say("{}", wrapped(when, "  "));
-    }
-    if (!finding.next.empty()) {
-      say("{}", wrapped(finding.next, "  → "));
-    }
-  }
-  const std::size_t fine = health.count(doctor::FindingSeverity::fine);
-  if (!all && fine > 0) {
-    say("{} check{} found nothing to mention (--all shows them)\n", fine, fine == 1 ? "" : "s");
-  }
-  if (!health.assumed.empty()) {
-    say("{}\n", health.assumed);
-  }
-  say("{}\n", health.sentence);
-}
-
 int run(const Arguments& a) {
   make_directory(a.common, {"doctor.json"});
   const std::optional<Robot> robot = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
   const auto opened = logs::open_log(a.logs, robot ? robot_reader(*robot, a.common) : reader_options(a.common));
   logs::RecordedLog& log = *opened;
-  const LogTable table = first_rows(log, a.most_rows);
-  doctor::LogHealth health = doctor::examine(table, robot, results::reader_counts(log.report()));
-  if (table.rows() < log.report().rows) {
-    health.findings.push_back(
-        {.id = "time.first_rows_only",
-         .sentence = fmt::format("Only the first {} of {} rows were looked at.", table.rows(), log.report().rows),
-         .next = "--rows N looks at more.",
-         .value = static_cast<double>(table.rows())});
-    health.findings.back().severity = doctor::FindingSeverity::notice;
-  }
+  const doctor::LogHealth health = results::examine_first(log, robot, a.most_rows);
   if (!a.common.out.empty() || a.common.json) {
     results::HealthFiles files{a.robot.string(), {}, results::software()};
     for (const std::filesystem::path& path : a.logs) {
@@ -120,7 +58,7 @@ int run(const Arguments& a) {
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
-    tell(health, a.all);
+    say("{}", words::summary(health, a.all));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "doctor.json").string(), (a.common.out / "report.html").string());
     }

@@ -81,13 +81,8 @@ int run(const Arguments& a) {
       .robot = model.robot.name,
       .source = fmt::format("{}, thresholds {}", a.model.filename().string(), core::warrant_word(model.warrant)),
       .software = results::software()};
-  const std::string text =
-      model.at_risk ? exporter::c_header(
-                          detector,
-                          exporter::scale_detector_for_c(
-                              model, {.false_alarms = commission::torque_false_alarms(model), .set = a.detector.set}),
-                          options)
-                    : exporter::c_header(detector, options);
+  const double false_alarms = model.at_risk ? commission::torque_false_alarms(model) : 0.0;
+  const std::string text = exporter::c_header(model, a.detector, false_alarms, options);
   std::string file;
   if (!a.common.out.empty()) {
     make_directory(a.common);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -12,16 +10,17 @@
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/fleet_report.hpp>
 #include <wheelwright/results/fleet_json.hpp>
+#include <wheelwright/results/fleet_logs.hpp>
 #include <wheelwright/robots/fleet_list.hpp>
 #include <wheelwright/robots/robot_file.hpp>
 #include <wheelwright/study/examine_robot.hpp>
 #include <wheelwright/study/fleet_result.hpp>
+#include <wheelwright/words/summary.hpp>
 
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
 #include "run_items.hpp"
-#include "sound_log.hpp"
 
 namespace wheelwright::app {
 namespace fleet_command {
@@ -61,45 +60,6 @@ constexpr const char* kExamples =
     "  wheelwright fleet fleet.csv --robot robot.yaml --out result --merge\n\n"
     "Exit code: 0 all is well, 1 a robot stands outside, drifts, raised an alarm, contradicts its model or could not "
     "be\nexamined (the report lists which), 2 bad usage or no such list.";
-
-study::FleetLog log_of(const robots::FleetListRobot& robot, const std::vector<robots::FleetListLog>& logs,
-                       const std::optional<Robot>& fleet, const CommonOptions& common) {
-  study::FleetLog out;
-  std::vector<std::filesystem::path> paths;
-  for (const robots::FleetListLog& log : logs) {
-    out.name += (out.name.empty() ? "" : ", ") + log.path.string();
-    paths.push_back(log.path);
-  }
-  out.when = logs.empty() ? 0.0 : logs.front().when;
-  out.open = [file = robot.robot_file, &fleet, &common, paths] {
-    if (paths.empty()) {
-      throw InputError("no log to commission with: expected one with the role commission, or none");
-    }
-    if (file.empty() && !fleet) {
-      throw InputError("no robot file: expected --robot, or a robot.yaml or robot_file of its own");
-    }
-    const Robot declared = file.empty() ? *fleet : read_robot(file);
-    CommonOptions options = common;
-    take_columns(file, options);
-    std::unique_ptr<logs::RecordedLog> log = open_sound_log(paths, declared, options, WheelPose::judged).log;
-    logs::require_columns(*log, robots::needed_columns(declared));
-    Robot robot_with_errors = model::with_column_errors(declared, logs::interpolation_errors(log->report()));
-    return study::OpenedLog{std::move(log), std::move(robot_with_errors)};
-  };
-  return out;
-}
-
-study::RobotLogs logs_of(const robots::FleetListRobot& robot, const std::optional<Robot>& fleet,
-                         const CommonOptions& common) {
-  study::RobotLogs logs{.robot = robot.name,
-                        .dated = robot.dated,
-                        .commissioning = log_of(robot, robot.commission, fleet, common),
-                        .findings = robot.findings};
-  for (const robots::FleetListLog& check : robot.checks) {
-    logs.checks.push_back(log_of(robot, {check}, fleet, common));
-  }
-  return logs;
-}
 
 results::StoredPlan plan_of(const Arguments& a, const std::optional<Robot>& fleet) {
   results::StoredPlan plan = {{"fleet format", results::kFleetSchema},
@@ -156,47 +116,20 @@ std::string command_of(const Arguments& a) {
   return out + " --out DIR";
 }
 
-// Why logs failed, the most frequent reasons first, each with one log that it befell.
-void tell_failures(const study::FleetResult& fleet) {
-  constexpr std::size_t kMostReasons = 5;
-  struct Reason {
-    const study::FleetFinding* first;
-    std::size_t count;
-  };
-  std::vector<Reason> reasons;
-  for (const study::FleetFinding& finding : fleet.failed) {
-    const auto known = std::find_if(reasons.begin(), reasons.end(),
-                                    [&](const Reason& reason) { return reason.first->text == finding.text; });
-    if (known == reasons.end()) {
-      reasons.push_back({&finding, 1});
-    } else {
-      ++known->count;
-    }
-  }
-  std::stable_sort(reasons.begin(), reasons.end(), [](const Reason& a, const Reason& b) { return a.count > b.count; });
-  for (std::size_t i = 0; i < std::min(reasons.size(), kMostReasons); ++i) {
-    const auto& [first, count] = reasons[i];
-    const std::string& robot = fleet.table.robots[first->robot];
-    say("  {}{}{}: {}\n", robot, first->log.empty() ? "" : ", " + first->log,
-        count > 1 ? fmt::format(" and {} more", count - 1) : "", first->text);
-  }
-  if (reasons.size() > kMostReasons) {
-    say("  and {} other reasons: see fleet.json or report.html in --out\n", reasons.size() - kMostReasons);
-  }
-}
-
 int run(const Arguments& a) {
   make_directory(a.common, {"fleet.json", "fleet.csv", "pooled_prior.yaml"});
-  (void)reader_options(a.common);  // what is wrong with --map is wrong for every log
   const std::vector<robots::FleetListRobot> robots = robots::read_fleet(a.list);
   const std::optional<Robot> own = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
+  CommonOptions given = a.common;
+  given.columns.clear();
+  const results::FleetReading reading{own, a.common.columns, reader_options(given), a.common.despite};
   study::ExamineOptions examine;
   examine.commission.at_risk = commission::CommissionOptions::AtRisk::detector;  // no record says what it will see
   examine.commission.noise_mode = a.statistical ? filter::NoiseMode::statistical : filter::NoiseMode::worst_case;
   ItemsToRun items;
   items.work.items = robots.size();
   items.work.evaluate = [&](std::size_t item) {
-    return results::record_text(study::examine_robot(logs_of(robots[item], own, a.common), examine));
+    return results::record_text(study::examine_robot(results::logs_of(robots[item], reading), examine));
   };
   items.key = [&](std::size_t item) { return robots::key_of(robots[item]); };
   items.plan = plan_of(a, own);
@@ -220,10 +153,7 @@ int run(const Arguments& a) {
   publish(a.common, results::to_json(fleet, a.list.string(), results::software()), "fleet.json",
           a.common.out.empty() ? std::string() : report::fleet_report(fleet, context));
   if (!a.common.quiet && !a.common.json) {
-    for (const std::string& sentence : study::sentences(fleet)) {
-      say("{}\n", sentence);
-    }
-    tell_failures(fleet);
+    say("{}", words::summary(fleet));
     if (!a.common.out.empty()) {
       say("wrote fleet.json, fleet.csv, pooled_prior.yaml and report.html to {}\n", a.common.out.string());
     }

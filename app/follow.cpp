@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -52,6 +53,39 @@ std::optional<std::vector<std::size_t>> pick_columns(const logs::CsvRowParser& p
   return pick;
 }
 
+// Writes what happens as it happens.
+class Teller {
+ public:
+  Teller(std::ostream& out, const FollowOptions& how) : out_(out), json_(how.json), path_(how.events) {
+    if (!path_.empty()) {
+      file_.open(path_, std::ios::app);
+    }
+  }
+
+  /// `as_json` and `as_text` make the line; each is asked where it is needed.
+  template <typename AsJson, typename AsText>
+  void operator()(const AsJson& as_json, const AsText& as_text) {
+    std::string line;
+    if (json_ || !path_.empty()) {
+      line = files::json_text(as_json(), -1);
+    }
+    out_ << (json_ ? line : std::string(as_text())) << std::endl;
+    append(line);
+  }
+  /// A line for the file alone.
+  void append(const std::string& line) {
+    if (!path_.empty() && !(file_ << line << std::endl)) {
+      throw InputError(path_.string() + ": cannot be written: expected a writable place with room on the disk");
+    }
+  }
+
+ private:
+  std::ostream& out_;
+  bool json_;
+  std::filesystem::path path_;
+  std::ofstream file_;
+};
+
 // One residual: its detector, its columns, its events, and the model that names its outputs.
 template <typename AnyDetector>
 class Watch {
@@ -64,8 +98,7 @@ class Watch {
         recorder_(model.model.n(), kMerge) {}
 
   /// Takes a row, tells an event that begins with it; whether there was a decision.
-  bool take(const LogBlock& row, std::size_t number, std::ostream& out, bool json, commission::IncidentWatch& incidents,
-            bool torque) {
+  bool take(const LogBlock& row, std::size_t number, Teller& tell, commission::IncidentWatch& incidents, bool torque) {
     if (!row.segment_starts.empty()) {
       detector_.restart();
     }
@@ -78,7 +111,7 @@ class Watch {
       const detector::ChannelDecision& c = decision.channels[i];
       if (recorder_.add(i, number, row.t[0], c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm)) {
         const detector::Event& event = recorder_.events().back();
-        out << (json ? files::json_text(results::to_json(event, model_), -1) : event_line(event, model_)) << std::endl;
+        tell([&] { return results::to_json(event, model_); }, [&] { return event_line(event, model_); });
         incidents.event(event, torque);
       } else if (c.alarm) {
         incidents.lasts(row.t[0]);
@@ -102,10 +135,8 @@ class Watch {
 // Times in which no row comes.
 class Silence {
  public:
-  Silence(double step, std::ostream& out, bool json)
-      : patience_(static_cast<std::int64_t>(1000.0 * std::max(kPatience, kFewestRows * step))),
-        out_(out),
-        json_(json) {}
+  Silence(double step, Teller& tell)
+      : patience_(static_cast<std::int64_t>(1000.0 * std::max(kPatience, kFewestRows * step))), tell_(tell) {}
 
   [[nodiscard]] std::chrono::milliseconds patience() const { return patience_; }
   /// Nothing has come for the patience.
@@ -127,13 +158,11 @@ class Silence {
   using Clock = std::chrono::steady_clock;
   void tell() {
     silence_.seconds = std::chrono::duration<double>(Clock::now() - last_).count();
-    out_ << (json_ ? files::json_text({{"silent", results::to_json(silence_)}}, -1) : silence_line(silence_))
-         << std::endl;
+    tell_([&]() -> Json { return {{"silent", results::to_json(silence_)}}; }, [&] { return silence_line(silence_); });
   }
 
   std::chrono::milliseconds patience_;
-  std::ostream& out_;
-  bool json_;
+  Teller& tell_;
   Clock::time_point last_ = Clock::now();
   commission::StreamSilence silence_;
   bool told_ = false;
@@ -165,11 +194,10 @@ class Awaited final : public files::ByteSource {
 // Spells without a decision on the torque residual, with what the parser met in them.
 class Blindness {
  public:
-  Blindness(const OnlineModel& model, logs::CsvRowParser& parser, std::ostream& out, bool json)
+  Blindness(const OnlineModel& model, logs::CsvRowParser& parser, Teller& tell)
       : model_(model),
         parser_(parser),
-        out_(out),
-        json_(json),
+        tell_(tell),
         watch_(model.measurement.nominal_step, model.filter.settle / model.filter.beta) {}
 
   /// Before each line.
@@ -208,15 +236,16 @@ class Blindness {
     return why_blind(model_, causes);
   }
   void tell(const commission::BlindSpell& spell, std::optional<double> until) {
-    out_ << (json_ ? files::json_text({{"blind", results::to_json(spell, until, why())}}, -1)
-                   : blind_line(spell, until, why()))
-         << std::endl;
+    tell_(
+        [&]() -> Json {
+          return {{"blind", results::to_json(spell, until, why())}};
+        },
+        [&] { return blind_line(spell, until, why()); });
   }
 
   const OnlineModel& model_;
   logs::CsvRowParser& parser_;
-  std::ostream& out_;
-  bool json_;
+  Teller& tell_;
   commission::BlindWatch watch_;
   logs::Occurrences unreadable_;
 };
@@ -224,8 +253,14 @@ class Blindness {
 }  // namespace
 
 ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
-                const detector::DetectorOptions& options, const logs::CsvOptions& reader, bool json) {
-  Silence silence(model.measurement.nominal_step, out, json);
+                const detector::DetectorOptions& options, const logs::CsvOptions& reader, const FollowOptions& how) {
+  Teller teller(out, how);
+  teller.append(files::json_text({{"schema", kEventsSchema},
+                                  {"software", results::software()},
+                                  {"robot", model.robot.name},
+                                  {"warrant", core::warrant_word(model.warrant)}},
+                                 -1));
+  Silence silence(model.measurement.nominal_step, teller);
   files::LineReader in(std::make_unique<Awaited>(stream, silence), kName);
   std::string_view line;
   do {
@@ -262,17 +297,21 @@ ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const On
     pose_sums.emplace(*model.kinematic, detector::PoseSumOptions{.false_alarms = commission::pose_false_alarms(model)});
   }
   const auto announce = [&](const commission::RiskEvent& event) {
-    out << (json ? files::json_text({{"at_risk", results::to_json(event, model)}}, -1)
-                 : "at a stated risk, " + commission::sentence(event, model.model))
-        << std::endl;
+    teller(
+        [&]() -> Json {
+          return {{"at_risk", results::to_json(event, model)}};
+        },
+        [&] { return "at a stated risk, " + commission::sentence(event, model.model); });
   };
   commission::IncidentWatch incidents(model);
   const auto tell_incident = [&](const char* change, const detector::Incident& incident) {
-    Json said = results::to_json(incident);
-    said["change"] = change;
-    out << (json ? files::json_text({{"incident", said}}, -1)
-                 : fmt::format("incident {}: {}", change, incident_sentence(incident)))
-        << std::endl;
+    teller(
+        [&]() -> Json {
+          Json said = results::to_json(incident);
+          said["change"] = change;
+          return {{"incident", std::move(said)}};
+        },
+        [&] { return fmt::format("incident {}: {}", change, incident_sentence(incident)); });
   };
   const auto settle = [&](bool all) {
     for (const commission::IncidentWatch::Told& told : incidents.settle(all)) {
@@ -282,10 +321,27 @@ ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const On
       tell_incident(told.change == detector::IncidentRecorder::Change::opened ? "opened" : "narrowed", told.incident);
     }
   };
-  Blindness blindness(model, parser, out, json);
+  Blindness blindness(model, parser, teller);
   LogBlock row;
   std::size_t number = 0;
-  std::vector<double> times;  // of the first rows
+  std::vector<double> times;      // of the first rows
+  double beat = core::kInfinity;  // s, of the last heartbeat
+  const auto heartbeat = [&](double t) {
+    const bool open = incidents.open().has_value();
+    teller(
+        [&]() -> Json {
+          return {{"watching",
+                   {{"t", t},
+                    {"rows", number},
+                    {"decided", torque.decisions()},
+                    {"blind", blindness.blind()},
+                    {"incident", open}}}};
+        },
+        [&] {
+          return fmt::format("watching at {:.6g} s: {} rows, {} decided{}{}", t, number, torque.decisions(),
+                             blindness.blind() ? ", blind" : "", open ? ", an incident is open" : "");
+        });
+  };
   while (in.next(line)) {
     blindness.begin_line();
     try {
@@ -305,7 +361,7 @@ ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const On
       sample[c] = row.columns[(*pick)[c]][0];
     }
     incidents.row(row.t[0], sample, !row.segment_starts.empty());
-    if (torque.take(row, number, out, json, incidents, true)) {
+    if (torque.take(row, number, teller, incidents, true)) {
       blindness.decided(row.t[0]);
     } else {
       blindness.undecided(row.t[0]);
@@ -314,7 +370,7 @@ ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const On
       times.push_back(row.t[0]);
     }
     if (kinematic) {
-      kinematic->take(row, number, out, json, incidents, false);
+      kinematic->take(row, number, teller, incidents, false);
     }
     const auto sum = [&](auto& sums, const auto& columns, std::vector<double>& values, auto& recorder) {
       if (!row.segment_starts.empty()) {
@@ -336,6 +392,13 @@ ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const On
     }
     settle(false);
     ++number;
+    if (how.heartbeat > 0.0 && !(row.t[0] >= beat && row.t[0] < beat + how.heartbeat)) {
+      // The first row, and where the clock went back, only set the beat.
+      if (row.t[0] >= beat) {
+        heartbeat(row.t[0]);
+      }
+      beat = row.t[0];
+    }
   }
   settle(true);
   if (incidents.open()) {

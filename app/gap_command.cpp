@@ -27,6 +27,7 @@
 #include <wheelwright/words/summary.hpp>
 #include "commands.hpp"
 #include "common.hpp"
+#include "drive_files.hpp"
 #include "options.hpp"
 #include "sound_log.hpp"
 
@@ -84,7 +85,7 @@ constexpr const char* kExamples =
     "Exit code: 0 a diagnosis was made, whatever it is; 2 bad input.";
 
 constexpr const char* kImproved = "robot_improved.yaml";
-constexpr const char* kNext = "next_manoeuvre.csv";
+constexpr const char* kNext = "next_manoeuvre";
 constexpr const char* kResiduals = "residuals.csv";
 
 std::vector<std::string> names_of_files(const std::vector<std::filesystem::path>& files) {
@@ -142,7 +143,7 @@ std::string origin(const Arguments& a, const Diagnosis& d) {
   return line + "\n";
 }
 
-void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& next) {
+void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& next, const Robot& robot) {
   const std::filesystem::path& out = a.common.out;
   results::write_residuals(out / kResiduals, d.series);
   // What an earlier run left would contradict this one.
@@ -153,9 +154,11 @@ void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& 
     std::filesystem::remove(out / kImproved);
   }
   if (next.commands) {
-    logs::write_csv(out / kNext, *next.commands);
+    write_drive(out, kNext, *next.commands, robot);
   } else {
-    std::filesystem::remove(out / kNext);
+    for (const std::string& file : drive_files(kNext)) {
+      std::filesystem::remove(out / file);
+    }
   }
 }
 
@@ -269,7 +272,10 @@ void say_simulators(const Arguments& a, const std::vector<SimulatorSource>& sour
 }
 
 int run(const Arguments& a) {
-  std::vector<std::string> written = {"gap.json", kImproved, kNext, kResiduals};
+  std::vector<std::string> written = {"gap.json", kImproved, kResiduals};
+  for (const std::string& file : drive_files(kNext)) {
+    written.push_back(file);
+  }
   for (const std::filesystem::path& simulator : a.simulators) {
     if (!simulator.empty()) {
       written.push_back(edited_name(simulator));
@@ -344,7 +350,7 @@ int run(const Arguments& a) {
   names.residuals = files ? kResiduals : "";
   names.software = results::software();
   if (next.commands) {
-    names.next_manoeuvre = results::NextManoeuvre{files ? kNext : "", promise};
+    names.next_manoeuvre = results::NextManoeuvre{files ? drive_files(kNext).front() : "", promise};
   }
   Json result = results::to_json(diagnosis, names);
   result["improved"] = files && diagnosis.improved ? Json(kImproved) : Json(nullptr);
@@ -354,7 +360,7 @@ int run(const Arguments& a) {
   }
   const std::vector<robots::EditedSimulator> edits = write_simulators(a, sources, change, robot, result);
   if (files) {
-    write_beside(a, diagnosis, next);
+    write_beside(a, diagnosis, next, robot);
   }
   publish(a.common, result, "gap.json",
           files ? report::gap_report(diagnosis, robot.name, context, promise) : std::string());

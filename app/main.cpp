@@ -82,6 +82,7 @@ int run(int argc, char** argv) {
                                                              {"detect", add_detect(program)},
                                                              {"doctor", add_doctor(program)},
                                                              {"check", add_check(program)},
+                                                             {"compare", add_compare(program)},
                                                              {"identify", add_identify(program)},
                                                              {"margins", add_margins(program)},
                                                              {"sensitivity", add_sensitivity(program)},

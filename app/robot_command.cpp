@@ -72,11 +72,7 @@ int run(const Arguments& a) {
     files::atomic_write(target, text);
   }
   if (a.common.json) {
-    Json result{{"schema", "wheelwright/robot-file/1"}, {"software", results::software()}, {"files", robot.files}};
-    result["robot"] = robots::to_json(robot.robot);
-    result["origins"] = robot.origins;
-    result["remarks"] = robot.remarks;
-    say_json(result);
+    say_json(robots::to_json(robot, results::software()));
   } else if (target.empty()) {
     say("{}", text);
   } else if (!a.common.quiet) {

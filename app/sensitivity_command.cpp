@@ -6,15 +6,13 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/commission.hpp>
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/sensitivity_report.hpp>
 #include <wheelwright/results/study_json.hpp>
 #include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/study/bound_derivatives.hpp>
-#include <wheelwright/study/study.hpp>
-
+#include <wheelwright/study/study_work.hpp>
 #include <wheelwright/words/summary.hpp>
+
 #include "commands.hpp"
 #include "common.hpp"
 #include "options.hpp"
@@ -74,15 +72,9 @@ std::string fingerprint_of(const study::Study& study) {
 }
 
 ItemsToRun items_of(const study::Study& study, const study::StudyDesign& design) {
-  const auto point = [&](std::size_t item) -> Eigen::VectorXd {
-    return design.points.row(static_cast<Eigen::Index>(design.rows[item]));
-  };
   ItemsToRun items;
-  items.work.items = design.rows.size();
-  items.work.evaluate = [&study, point](std::size_t item) {
-    return study::text_of(study::evaluate_point(study, point(item)));
-  };
-  items.key = [&study, point](std::size_t item) { return study::name_of_point(study, point(item)); };
+  items.work = study::work_of(study, design);
+  items.key = [&](std::size_t item) { return study::name_of_point(study, study::point_of(design, item)); };
   std::string quantities;
   for (const study::StudyQuantity& quantity : study.quantities) {
     quantities += (quantities.empty() ? "" : ", ") + quantity.name;
@@ -91,43 +83,6 @@ ItemsToRun items_of(const study::Study& study, const study::StudyDesign& design)
                 {"quantities", quantities},
                 {"window", fmt::format("{}", study.evaluate.window)}};
   return items;
-}
-
-// The inputs that have local derivatives: those of the robot file.
-std::vector<std::string> local_inputs(const study::Study& study) {
-  std::vector<std::string> names;
-  for (const study::StudyInput& input : study.inputs) {
-    for (const char* family :
-         {"noise.", "declared.", "filter.", "wheel_radius", "track_width", "encoder_counts_per_turn", "prior."}) {
-      if (input.name.starts_with(family)) {
-        names.push_back(input.name);
-      }
-    }
-  }
-  return names;
-}
-
-// Derivatives at the nominal point; without a model or an input that has any, a note says so.
-std::optional<study::LocalSensitivity> derivatives(const study::Study& study, std::vector<std::string>& notes) {
-  const std::vector<std::string> inputs = local_inputs(study);
-  if (!study.methods.local || inputs.empty()) {
-    if (study.methods.local) {
-      notes.push_back("no local derivatives: none of the inputs stands in the robot file");
-    }
-    return std::nullopt;
-  }
-  try {
-    const study::StudyCase nominal = study::case_at(study, study::nominal_point(study.inputs));
-    const LogTable table = study::drive_of_case(nominal);
-    TableSource log(table);
-    commission::CommissionOptions options;
-    options.outliers = nominal.outliers_allowed;
-    const Commissioning commissioning = commission_robot(log, nominal.robot, options);
-    return study::local_derivatives(log, commissioning, {.inputs = inputs});
-  } catch (const Error& error) {
-    notes.push_back(std::string("no local derivatives: ") + error.what());
-    return std::nullopt;
-  }
 }
 
 int run(const Arguments& a) {
@@ -145,7 +100,7 @@ int run(const Arguments& a) {
   study::StudyValues values(study, design);
   done.results->each([&](std::size_t item, std::string_view text) { values.put(item, study::case_result(text)); });
   const study::StudyResult result = values.result();
-  const std::optional<study::LocalSensitivity> local = derivatives(study, file.notes);
+  const std::optional<study::LocalSensitivity> local = study::nominal_derivatives(study, file.notes);
   report::ReportContext context;
   context.software = results::software();
   context.command_line = a.common.command_line;

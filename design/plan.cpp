@@ -177,6 +177,26 @@ LogTable command_table(const Plan& plan, const Model& model) {
   return table;
 }
 
+LogTable velocity_table(const LogTable& commands, const Robot& robot) {
+  const auto column = [&](const char* name) -> const std::vector<double>& {
+    const auto found = std::ranges::find(commands.names, name);
+    check::that(found != commands.names.end(), "velocity_table", "the columns command_r and command_l");
+    return commands.columns[static_cast<std::size_t>(found - commands.names.begin())];
+  };
+  const std::vector<double>& right = column("command_r");
+  const std::vector<double>& left = column("command_l");
+  LogTable table;
+  table.t = commands.t;
+  table.segment_starts = commands.segment_starts;
+  table.names = {"linear_x", "angular_z"};
+  table.columns.resize(2);
+  for (std::size_t k = 0; k < right.size(); ++k) {
+    table.columns[0].push_back(0.5 * robot.wheel_radius * (right[k] + left[k]));
+    table.columns[1].push_back(robot.wheel_radius * (right[k] - left[k]) / robot.track_width);
+  }
+  return table;
+}
+
 Box promised_bounds(const RegressionBlock& rows, const DesignSubject& subject) {
   core::RegressionTable table(rows);
   return bounds::interval_hull(table, subject.prior).hull;

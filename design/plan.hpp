@@ -122,6 +122,11 @@ void integrate_pose(Plan& plan, const Model& model);
 /// (rad). One joint: t, command (rad/s or m/s), position (rad or m). Throws InvalidArgument for other models.
 [[nodiscard]] LogTable command_table(const Plan& plan, const Model& model);
 
+/// Commands of a differential drive (command_table()) as its speed and yaw rate: t, linear_x (m/s), angular_z (rad/s),
+/// r(ω_r + ω_l)/2 and r(ω_r − ω_l)/D with the robot file's geometry. Throws InvalidArgument without the columns
+/// command_r and command_l.
+[[nodiscard]] LogTable velocity_table(const LogTable& commands, const Robot& robot);
+
 /// A number to be minimised, of the planned rows (planned_rows()). It must be a pure function: searches call it from
 /// several threads. Other aims (certain detection of a fault, telling two effects apart) are other functions of the
 /// rows.

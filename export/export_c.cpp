@@ -502,4 +502,12 @@ detector::ScaleDetector scale_detector_for_c(const OnlineModel& model, detector:
   return result;
 }
 
+std::string c_header(const OnlineModel& model, const detector::DetectorOptions& detector, double false_alarms,
+                     const CExportOptions& options) {
+  const TorqueDetector made = make_detector(model, detector);
+  return model.at_risk
+             ? c_header(made, scale_detector_for_c(model, {.false_alarms = false_alarms, .set = detector.set}), options)
+             : c_header(made, options);
+}
+
 }  // namespace wheelwright::exporter

@@ -38,6 +38,11 @@ struct CExportOptions {
 [[nodiscard]] std::string c_header(const TorqueDetector& detector, const detector::ScaleDetector& sums,
                                    const CExportOptions& options = {});
 
+/// The detector of `model` as `options` ask for it, with the one at a stated risk where the model says something at one,
+/// for an expected number of `false_alarms` in a second there. Throws as c_header() and make_detector() do.
+[[nodiscard]] std::string c_header(const OnlineModel& model, const detector::DetectorOptions& detector,
+                                   double false_alarms, const CExportOptions& options = {});
+
 /// The detector at a stated risk of `model`, with the box of its set where `options` say so, or the set has more
 /// vertices than a table takes. Throws as ScaleDetector.
 [[nodiscard]] detector::ScaleDetector scale_detector_for_c(const OnlineModel& model,

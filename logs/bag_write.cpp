@@ -51,13 +51,21 @@ struct RosEncoder::Impl {
   FastBuffer buffer;
 
   /// Bytes of what `fields` puts behind the encapsulation.
-  template <typename Message, typename Fields>
-  std::string_view encode(const Message& message, const Fields& fields) {
+  template <typename Fields>
+  std::string_view encode(const Fields& fields) {
     Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
     cdr.serialize_encapsulation();
-    put(cdr, message.header);
     fields(cdr);
     return {buffer.getBuffer(), cdr.getSerializedDataLength()};
+  }
+
+  /// Of what `fields` puts behind the message's header.
+  template <typename Message, typename Fields>
+  std::string_view encode(const Message& message, const Fields& fields) {
+    return encode([&](Cdr& cdr) {
+      put(cdr, message.header);
+      fields(cdr);
+    });
   }
 };
 
@@ -73,6 +81,10 @@ std::string_view RosEncoder::encode(const RosJointState& message) {
 
 std::string_view RosEncoder::encode(const RosPoseStamped& message) {
   return impl_->encode(message, [&](Cdr& to) { put(to, message.pose); });
+}
+
+std::string_view RosEncoder::encode(const RosTwist& message) {
+  return impl_->encode([&](Cdr& to) { put(to, message); });
 }
 
 std::string_view RosEncoder::encode(const RosTwistStamped& message) {

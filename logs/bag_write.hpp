@@ -41,6 +41,7 @@ struct RosPose {
 
 /// geometry_msgs/msg/Twist: x, y, z in m/s and in rad/s.
 struct RosTwist {
+  static constexpr const char* type = "geometry_msgs/msg/Twist";
   std::array<double, 3> linear{};
   std::array<double, 3> angular{};
 };
@@ -108,6 +109,7 @@ class RosEncoder {
   /// The message in CDR, until the next call. Throws InvalidArgument when its stamp is negative or beyond 2^31 s.
   std::string_view encode(const RosJointState& message);
   std::string_view encode(const RosPoseStamped& message);
+  std::string_view encode(const RosTwist& message);
   std::string_view encode(const RosTwistStamped& message);
   std::string_view encode(const RosOdometry& message);
   std::string_view encode(const RosImu& message);

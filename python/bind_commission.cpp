@@ -33,6 +33,23 @@ struct CommissionObject {
   [[nodiscard]] Json json() const { return results::to_json(*result, data, results::software()); }
 };
 
+std::unique_ptr<CommissionObject> made(Commissioning result, logs::LogReport data) {
+  auto out = std::make_unique<CommissionObject>();
+  out->result = std::make_shared<const Commissioning>(std::move(result));
+  out->data = std::move(data);
+  const auto p = static_cast<Eigen::Index>(out->result->parameters.size());
+  out->estimate = out->standard_error = out->lower = out->upper = Eigen::VectorXd(p);
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const ParameterResult& parameter = out->result->parameters[static_cast<std::size_t>(j)];
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    out->estimate[j] = parameter.estimate.value_or(nan);
+    out->standard_error[j] = parameter.standard_error.value_or(nan);
+    out->lower[j] = parameter.lower;
+    out->upper[j] = parameter.upper;
+  }
+  return out;
+}
+
 std::unique_ptr<CommissionObject> run(LogObject& log, const RobotObject& robot, bool statistical, std::size_t outliers,
                                       std::pair<std::size_t, std::size_t> persistence, py::object progress) {
   commission::CommissionOptions options;
@@ -45,21 +62,9 @@ std::unique_ptr<CommissionObject> run(LogObject& log, const RobotObject& robot, 
     const LogWalk walk(log);
     logs::require_columns(*log.source, robots::needed_columns(robot.robot));
     WatchedLog source(*log.source, work);
-    auto out = std::make_unique<CommissionObject>();
-    out->result = std::make_shared<const Commissioning>(commission_robot(
-        source, model::with_column_errors(robot.robot, logs::interpolation_errors(log.source->report())), options));
-    out->data = log.source->report();
-    const auto p = static_cast<Eigen::Index>(out->result->parameters.size());
-    out->estimate = out->standard_error = out->lower = out->upper = Eigen::VectorXd(p);
-    for (Eigen::Index j = 0; j < p; ++j) {
-      const ParameterResult& parameter = out->result->parameters[static_cast<std::size_t>(j)];
-      constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-      out->estimate[j] = parameter.estimate.value_or(nan);
-      out->standard_error[j] = parameter.standard_error.value_or(nan);
-      out->lower[j] = parameter.lower;
-      out->upper[j] = parameter.upper;
-    }
-    return out;
+    Commissioning result = commission_robot(
+        source, model::with_column_errors(robot.robot, logs::interpolation_errors(log.source->report())), options);
+    return made(std::move(result), log.source->report());
   });
 }
 
@@ -158,10 +163,20 @@ void bind_model(py::module_& m) {
 
 }  // namespace
 
+py::object commission_object(const Commissioning& result, const logs::LogReport& data) {
+  return py::cast(made(result, data));
+}
+
+std::optional<Json> commission_json(const py::handle& object) {
+  return py::isinstance<CommissionObject>(object) ? std::optional(object.cast<const CommissionObject&>().json())
+                                                  : std::nullopt;
+}
+
 void bind_commission(py::module_& m) {
   bind_parameter(m);
   bind_model(m);
-  py::class_<CommissionObject>(m, "Commission", "The result of commission(): model.json and the numbers in it.")
+  py::class_<CommissionObject> bound(m, "Commission", "The result of commission(): model.json and the numbers in it.");
+  bound
       .def_property_readonly(
           "status", [](const CommissionObject& c) { return files::word_of(results::kStatusWords, c.result->status); },
           "done, partial (bounds of some parameters are the prior's), empty (no theta explains the log), nothing, or "
@@ -169,6 +184,12 @@ void bind_commission(py::module_& m) {
       .def_property_readonly(
           "contradictions", [](const CommissionObject& c) { return to_python(c.json().at("contradictions")); },
           "list of dicts: id, withdraws, subject, value, limit, sentence, next")
+      .def_property_readonly(
+          "robot",
+          [](const CommissionObject& c) {
+            return RobotObject{c.result->model.robot, ""};
+          },
+          "with what the log decided: noise, filter")
       .def_property_readonly("message", [](const CommissionObject& c) { return c.result->message; })
       .def_property_readonly("notes", [](const CommissionObject& c) { return c.result->notes; })
       .def_property_readonly("parameters", [](const CommissionObject& c) { return c.result->parameters; })
@@ -216,11 +237,8 @@ void bind_commission(py::module_& m) {
       .def(
           "save",
           [](const CommissionObject& c, const std::filesystem::path& path) { files::write_json(path, c.json()); },
-          py::arg("path"), "Writes model.json, whole or not at all.")
-      .def("__repr__", [](const CommissionObject& c) {
-        return "<wheelwright.Commission of " + c.result->model.robot.name + ": " +
-               files::word_of(results::kStatusWords, c.result->status) + ">";
-      });
+          py::arg("path"), "Writes model.json, whole or not at all.");
+  tables_of(bound);
   m.def("commission", &run, py::arg("log"), py::arg("robot"), py::kw_only(), py::arg("statistical") = false,
         py::arg("outliers") = 0, py::arg("persistence") = std::pair<std::size_t, std::size_t>{1, 1},
         py::arg("progress") = py::none(),

@@ -59,7 +59,7 @@ DetectorRun run_detector(LogSource& log, TorqueDetector& detector, double merge)
 
 constexpr double kMerge = 0.5;  // s, as detect()
 
-using Rule = std::optional<std::pair<std::size_t, std::size_t>>;
+}  // namespace
 
 detector::DetectorOptions options_of(const std::string& set, const std::string& test, const Rule& persistence) {
   check::that(set == "polytope" || set == "box", "set '" + set + "'", "polytope or box");
@@ -72,6 +72,8 @@ detector::DetectorOptions options_of(const std::string& set, const std::string& 
   }
   return options;
 }
+
+namespace {
 
 // An event with the name of its channel.
 struct EventObject {
@@ -89,7 +91,7 @@ std::vector<EventObject> named(const std::vector<detector::Event>& events, const
 
 struct RunObject {
   DetectorRun run;
-  std::vector<std::string> outputs;
+  std::vector<std::string> outputs, units;
 };
 
 struct DetectorObject {
@@ -135,7 +137,8 @@ RunObject run_through(const DetectorObject& d, LogObject& log, py::object progre
   return work.run([&] {
     const LogWalk walk(log);
     WatchedLog source(*log.source, work);
-    return RunObject{run_detector(source, detector, kMerge), d.model.model->model.outputs};
+    const Model& model = d.model.model->model;
+    return RunObject{run_detector(source, detector, kMerge), model.outputs, model.output_units};
   });
 }
 
@@ -258,11 +261,12 @@ void bind_run(py::module_& m) {
                    self);
     };
   };
-  py::class_<RunObject>(m, "DetectorRun",
-                        "Every decision over a log: K instants, n outputs. Arrays are read-only views of shape (K, n) "
-                        "where nothing else is said.")
-      .def_property_readonly(
-          "t", [](const py::object& self) { return view(self.cast<const RunObject&>().run.t, self); }, "s, shape (K,)")
+  py::class_<RunObject> run(
+      m, "DetectorRun",
+      "Every decision over a log: K instants, n outputs. Arrays are read-only views of shape (K, n) "
+      "where nothing else is said.");
+  run.def_property_readonly(
+         "t", [](const py::object& self) { return view(self.cast<const RunObject&>().run.t, self); }, "s, shape (K,)")
       .def_property_readonly(
           "row",
           [](const py::object& self) {
@@ -271,6 +275,7 @@ void bind_run(py::module_& m) {
           },
           "rows of the log, shape (K,)")
       .def_readonly("outputs", &RunObject::outputs, "names of the n channels")
+      .def_readonly("output_units", &RunObject::units, "with torque as effort")
       .def_property_readonly("residual", numbers(&DetectorRun::residual), "(29)")
       .def_property_readonly("predicted", numbers(&DetectorRun::predicted), "Y_f theta (30)")
       .def_property_readonly("lower", numbers(&DetectorRun::lower), "l <= residual without a fault")
@@ -281,6 +286,7 @@ void bind_run(py::module_& m) {
           "fault", [](const RunObject& o) { return !o.run.events.empty(); }, "whether there is an event")
       .def_property_readonly("events", [](const RunObject& o) { return named(o.run.events, o.outputs); })
       .def("__len__", [](const RunObject& o) { return o.run.t.size(); });
+  tables_of(run);
 }
 
 }  // namespace
@@ -311,8 +317,9 @@ void bind_detector(py::module_& m) {
           "restart", [](DetectorObject& d) { d.detector.restart(); }, "Forgets all samples: for a gap in the data.")
       .def("run", &run_through, py::arg("log"), py::kw_only(), py::arg("progress") = py::none(),
            "All decisions over a log, from a fresh start. The interpreter's lock is released.");
-  py::class_<DetectionObject>(m, "Detection", "What `wheelwright detect` says of a log: both residuals, and isolation.")
-      .def_property_readonly("fault", &DetectionObject::fault)
+  py::class_<DetectionObject> detection(m, "Detection",
+                                        "What `wheelwright detect` says of a log: both residuals, and isolation.");
+  detection.def_property_readonly("fault", &DetectionObject::fault)
       .def_property_readonly(
           "events", [](const DetectionObject& d) { return named(d.detection.events, d.model.model->model.outputs); },
           "of the torque residual")
@@ -342,6 +349,7 @@ void bind_detector(py::module_& m) {
           "save",
           [](const DetectionObject& d, const std::filesystem::path& path) { files::write_json(path, d.json()); },
           py::arg("path"), "Writes detection.json, whole or not at all.");
+  tables_of(detection);
   m.def("detect", &detect_in, py::arg("log"), py::arg("model"), py::kw_only(), py::arg("set") = "polytope",
         py::arg("test") = "two_sided", py::arg("persistence") = std::nullopt, py::arg("threads") = 1,
         py::arg("progress") = py::none(),
@@ -498,7 +506,8 @@ void bind_margins(py::module_& m) {
           "windows", [](const commission::RiskMargins& r) { return copy(r.windows); }, "s, shape (windows,)")
       .def_readonly("faults", &commission::RiskMargins::margins, "each fault and side, in either residual")
       .def_readonly("pose_faults", &commission::RiskMargins::pose, "those that the pose shows, in it alone");
-  py::class_<MarginsObject>(m, "Margins", "Detectability along a drive: which faults are certain to be seen.")
+  py::class_<MarginsObject> margins(m, "Margins", "Detectability along a drive: which faults are certain to be seen.");
+  margins
       .def_property_readonly(
           "windows", [](const MarginsObject& o) { return copy(o.survey.windows); }, "s, shape (windows,)")
       .def_property_readonly(
@@ -515,6 +524,7 @@ void bind_margins(py::module_& m) {
       .def(
           "save", [](const MarginsObject& o, const std::filesystem::path& path) { files::write_json(path, o.json()); },
           py::arg("path"), "Writes margins.json, whole or not at all.");
+  tables_of(margins);
   const detector::MarginOptions usual;
   m.def("margins", &survey, py::arg("log"), py::arg("model"), py::kw_only(),
         py::arg("faults") = std::vector<std::string>{}, py::arg("windows") = std::nullopt,

@@ -473,6 +473,11 @@ void bind_cause(py::module_& m) {
 
 }  // namespace
 
+Json diagnosis_json(const py::handle& object) {
+  check::that(py::isinstance<DiagnosisObject>(object), "gap", "a Diagnosis or the path of a gap.json");
+  return object.cast<const DiagnosisObject&>().json;
+}
+
 void bind_gap(py::module_& m) {
   bind_effect(m);
   bind_cause(m);
@@ -526,10 +531,8 @@ void bind_gap(py::module_& m) {
           "The content of gap.json (results/gap.schema.json).")
       .def(
           "save", [](const DiagnosisObject& d, const std::filesystem::path& path) { files::write_json(path, d.json); },
-          py::arg("path"), "Writes gap.json, whole or not at all.")
-      .def("__repr__", [](const DiagnosisObject& d) {
-        return std::string("<wheelwright.Diagnosis: ") + results::name_of(d.diagnosis.verdict) + ">";
-      });
+          py::arg("path"), "Writes gap.json, whole or not at all.");
+  tables_of(diagnosis);
   for (const char* key : {"credible_set", "confusable", "where", "shrink", "parametric", "contradictions",
                           "next_manoeuvre", "not_excited", "floor_error", "floor_origin"}) {
     diagnosis.def_property_readonly(

@@ -179,6 +179,19 @@ namespace {
 using Path = std::filesystem::path;
 using Paths = std::variant<Path, std::vector<Path>>;
 
+}  // namespace
+
+robots::ColumnMap columns_of(const RobotObject& robot) {
+  if (robot.path.empty()) {
+    return {};
+  }
+  std::vector<std::string> names;
+  for (const logs::LogColumn& each : logs::log_columns()) {
+    names.push_back(each.name);
+  }
+  return robots::read_columns(robot.path, names);
+}
+
 logs::LogOptions reader_options(const RobotObject* robot, const std::map<std::string, std::string>& map,
                                 const std::vector<std::string>& extra) {
   logs::LogOptions options;
@@ -200,11 +213,16 @@ logs::LogOptions reader_options(const RobotObject* robot, const std::map<std::st
   return options;
 }
 
+namespace {
+
 std::unique_ptr<LogObject> read_recorded(const Paths& paths, const RobotObject* robot,
                                          const std::map<std::string, std::string>& map,
                                          const std::vector<std::string>& extra, const std::vector<Path>& msg_path,
                                          bool trust) {
   logs::LogOptions options = reader_options(robot, map, extra);
+  if (robot != nullptr) {
+    options.map.merge(columns_of(*robot));
+  }
   options.msg_path = msg_path;
   options.trust = trust;
   const auto files = std::holds_alternative<Path>(paths) ? std::vector<Path>{std::get<Path>(paths)}
@@ -402,9 +420,10 @@ std::unique_ptr<IdentificationObject> identify_log(LogObject& log, const RobotOb
 }  // namespace
 
 void bind_filter(py::module_& m) {
-  py::class_<RegressionObject>(m, "Regression",
-                               "A filtered log as y = Y theta + e (25): K instants, n outputs, p parameters. Arrays "
-                               "are read-only views.")
+  py::class_<RegressionObject> regression(
+      m, "Regression",
+      "A filtered log as y = Y theta + e (25): K instants, n outputs, p parameters. Arrays are read-only views.");
+  regression
       .def_property_readonly(
           "Y",
           [](const py::object& self) {
@@ -458,6 +477,7 @@ void bind_filter(py::module_& m) {
         filter["beta"] = r.filter.beta;
         return filter;
       });
+  tables_of(regression);
   m.def("filter_log", &filtered, py::arg("log"), py::arg("robot"), py::arg("model") = nullptr, py::kw_only(),
         py::arg("progress") = py::none(),
         "The rows of a log in memory: filter constants of the robot file or chosen as commission() does; with `model` "
@@ -477,7 +497,8 @@ void bind_filter(py::module_& m) {
       .def_readonly("rss", &identify::LeastSquaresFit::weighted_rss, "sum of squared residuals");
   m.def("least_squares", &fit, py::arg("Y"), py::arg("y"),
         "min |y - Y theta|^2 by sequential QR. Y of shape (rows, p), y (rows,). The interpreter's lock is released.");
-  py::class_<IdentificationObject>(m, "Identification", "What `wheelwright identify` says of a log.")
+  py::class_<IdentificationObject> identification(m, "Identification", "What `wheelwright identify` says of a log.");
+  identification
       .def_property_readonly("summary", [](const IdentificationObject& i) { return words::summary(i.result); })
       .def_property_readonly("notes", [](const IdentificationObject& i) { return i.result.notes; })
       .def(
@@ -487,6 +508,7 @@ void bind_filter(py::module_& m) {
           "save",
           [](const IdentificationObject& i, const std::filesystem::path& path) { files::write_json(path, i.json()); },
           py::arg("path"), "Writes identification.json, whole or not at all.");
+  tables_of(identification);
   m.def("identify", &identify_log, py::arg("log"), py::arg("robot"), py::kw_only(), py::arg("shapes") = true,
         py::arg("seed") = 1, py::arg("progress") = py::none(),
         "Everything that a log says about the parameters, without thresholds, as `wheelwright identify` does.\n\n"

@@ -12,7 +12,11 @@
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
 #include <wheelwright/design/stages.hpp>
+#include <wheelwright/gap/discrimination_design.hpp>
+#include <wheelwright/gap/effect.hpp>
+#include <wheelwright/gap/named_rivals.hpp>
 #include <wheelwright/results/design_json.hpp>
+#include <wheelwright/results/gap_json.hpp>
 #include <wheelwright/results/scenario_file.hpp>
 #include <wheelwright/results/software.hpp>
 #include <wheelwright/robots/robot_file.hpp>
@@ -149,17 +153,63 @@ std::vector<design::InspectedFault> inspected(const std::map<std::string, double
   return out;
 }
 
+// What a drive is to tell apart: the credible set of a gap, or causes by name with their sizes.
+struct Rivals {
+  std::optional<Json> gap;
+  std::string file;  // of it, for messages
+  std::vector<std::string> between;
+  std::map<std::string, double> sizes;
+};
+
+Rivals rivals_of(const py::object& gap, std::vector<std::string> between, std::map<std::string, double> sizes) {
+  Rivals out{{}, "", std::move(between), std::move(sizes)};
+  if (py::isinstance<py::str>(gap) || py::hasattr(gap, "__fspath__")) {
+    const Path path = gap.cast<Path>();
+    out.gap = files::read_json(path);
+    out.file = path.string();
+  } else if (!gap.is_none()) {
+    out.gap = diagnosis_json(gap);
+    out.file = "gap";
+  }
+  check::that(out.gap.has_value() != (out.between.size() >= 2), "aim 'discrimination'",
+              "gap, or at least two causes in between");
+  check::that(!out.gap || out.sizes.empty(), "sizes", "between, since a gap has the sizes");
+  return out;
+}
+
+gap::DiscriminationDesign tell_apart(const Rivals& given, const design::DesignSubject& subject,
+                                     const design::MotionLimits& limits, const design::DesignOptions& options) {
+  std::vector<Effect> catalogue = gap::effect_catalogue(subject.model);
+  const gap::Drive drive = gap::ordinary_drive(subject, limits);
+  gap::PlannedNoise noise = gap::expected_noise(subject);
+  std::vector<gap::NamedSize> sizes;
+  for (const auto& [what, value] : given.sizes) {
+    sizes.push_back({what, [v = value](const std::string&) { return v; }, "sizes['" + what + "']"});
+  }
+  const std::vector<gap::Rival> rivals = given.gap
+                                             ? results::rivals_of_gap(*given.gap, given.file, catalogue, drive, noise)
+                                             : gap::rivals_named(given.between, "between ", sizes, catalogue, drive);
+  return gap::design_for_discrimination(subject, limits, rivals, catalogue, noise, options);
+}
+
 std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, const RobotObject*>& of,
                                      const std::string& aim, double duration, const std::optional<double>& speed,
                                      const std::optional<double>& acceleration, const std::optional<double>& effort,
                                      const std::optional<double>& radius,
                                      const std::optional<std::array<double, 4>>& box, double rate,
                                      const std::string& criterion, const std::map<std::string, double>& faults,
-                                     std::size_t stages, const std::string& guarantee, std::uint64_t seed,
-                                     std::size_t threads, py::object progress) {
-  check::that(aim == "bounds" || aim == "detection", "aim '" + aim + "'", "bounds or detection");
+                                     std::size_t stages, const std::string& guarantee, const py::object& gap,
+                                     std::vector<std::string> between, std::map<std::string, double> sizes,
+                                     std::uint64_t seed, std::size_t threads, py::object progress) {
+  const bool discrimination = aim == "discrimination";
+  check::that(aim == "bounds" || aim == "detection" || discrimination, "aim '" + aim + "'",
+              "bounds, detection or discrimination");
+  check::that(discrimination || (gap.is_none() && between.empty() && sizes.empty()), "gap, between, sizes",
+              "aim 'discrimination'");
+  const std::optional<Rivals> rivals =
+      discrimination ? std::optional(rivals_of(gap, std::move(between), std::move(sizes))) : std::nullopt;
   const bool from_model = std::holds_alternative<const ModelObject*>(of);
-  check::that(aim == "bounds" || from_model, "aim 'detection'", "a commissioned Model, not a Robot");
+  check::that(aim != "detection" || from_model, "aim 'detection'", "a commissioned Model, not a Robot");
   check::positive(rate, "rate");
   const Robot& robot = from_model ? std::get<0>(of)->model->robot : std::get<1>(of)->robot;
   const design::MotionLimits limits = limits_for(robot, duration, speed, acceleration, effort, radius, box);
@@ -168,6 +218,8 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
   design::DesignOptions options;
   options.stages = stages;
   options.guarantee = guarantee_called(guarantee);
+  check::that(!discrimination || options.guarantee == design::Promise::every_noise, "guarantee 'at_risk'",
+              "aim bounds or detection; telling causes apart is statistical");
   options.seed = seed;
   options.threads = threads;
   options.progress = work.teller();
@@ -179,6 +231,7 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
       out->json["software"] = results::software();
       out->json["seed"] = seed;
       out->json["warrant"] = core::warrant_word(subject.warrant);
+      out->summary += "  these promises are " + std::string(core::warrant_word(subject.warrant)) + "\n";
       out->commands = design::command_table(made.manoeuvre.plan, subject.model);
       if (made.figure_eight_plan) {
         out->figure_eight = design::command_table(*made.figure_eight_plan, subject.model);
@@ -193,6 +246,15 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
       const design::DetectionDesign made =
           design::design_for_detection(model, subject, limits, inspected(faults, model), options);
       out->json = results::to_json(made, limits);
+      out->summary = words::summary(made);
+      finish(made);
+    } else if (rivals) {
+      options.samples = 150;
+      options.descents = 3;
+      options.steps = 250;
+      const design::MotionLimits in_torques = gap::limits_in_torques(limits, subject);
+      const gap::DiscriminationDesign made = tell_apart(*rivals, gap::in_torques(subject), in_torques, options);
+      out->json = results::to_json(made, in_torques);
       out->summary = words::summary(made);
       finish(made);
     } else {
@@ -217,7 +279,8 @@ void bind_sim(py::module_& m) {
         "Drives the paper's robot as a scenario file (or a dict with its keys) says, and returns what its sensors "
         "would log. seed: of all noise, in place of the scenario's.\n\n"
         "Raises InputError, naming file, line and key. The interpreter's lock is released; Ctrl-C ends the work.");
-  py::class_<DesignObject>(m, "Design", "A manoeuvre, and what it promises.")
+  py::class_<DesignObject> designed(m, "Design", "A manoeuvre, and what it promises.");
+  designed
       .def_property_readonly(
           "commands", [](const DesignObject& d) { return arrays_of(d.commands); },
           "t (s), wheel-speed commands command_r, command_l (rad/s), and the motion that they are for; read-only, "
@@ -227,28 +290,28 @@ void bind_sim(py::module_& m) {
           [](const DesignObject& d) {
             return d.figure_eight ? std::optional<py::dict>(arrays_of(*d.figure_eight)) : std::nullopt;
           },
-          "the best figure eight within the same limits; None for other than differential drives")
-      .def_readonly("summary", &DesignObject::summary)
-      .def(
-          "to_dict", [](const DesignObject& d) { return to_python(d.json); }, "The content of design.json.")
-      .def(
-          "save", [](const DesignObject& d, const Path& path) { files::write_json(path, d.json); }, py::arg("path"),
-          "Writes design.json, whole or not at all.");
+          "the best figure eight within the same limits; None for other than differential drives");
+  result_of(designed, "design");
   m.def("design", &design, py::arg("of"), py::arg("aim") = "bounds", py::kw_only(), py::arg("duration") = 20.0,
         py::arg("speed") = std::nullopt, py::arg("acceleration") = std::nullopt, py::arg("effort") = std::nullopt,
         py::arg("radius") = std::nullopt, py::arg("box") = std::nullopt, py::arg("rate") = 100.0,
         py::arg("criterion") = "geometric_mean", py::arg("faults") = std::map<std::string, double>{},
-        py::arg("stages") = design::DesignOptions{}.stages, py::arg("guarantee") = "every_noise", py::arg("seed") = 1,
-        py::arg("threads") = 1, py::arg("progress") = py::none(),
-        "Designs a drive for a Model (or, for bounds, a Robot with nominal values and declared noise), as "
+        py::arg("stages") = design::DesignOptions{}.stages, py::arg("guarantee") = "every_noise",
+        py::arg("gap") = py::none(), py::arg("between") = std::vector<std::string>{},
+        py::arg("sizes") = std::map<std::string, double>{}, py::arg("seed") = 1, py::arg("threads") = 1,
+        py::arg("progress") = py::none(),
+        "Designs a drive for a Model (or, not for detection, a Robot with nominal values and declared noise), as "
         "`wheelwright design` does.\n\n"
-        "aim: bounds (narrow bounds on theta) or detection (certain to find faults that are small). duration: s. speed "
+        "aim: bounds (narrow bounds on theta), detection (certain to find faults that are small) or discrimination "
+        "(tells "
+        "causes of a gap apart: the credible set of `gap`, a Diagnosis or a gap.json, or the effects in `between`, "
+        "several "
+        "joined by +, each of a size in `sizes`, EFFECT or EFFECT.PARAMETER -> SI value). duration: s. speed "
         "(rad/s), acceleration (rad/s^2), effort (N m): of a wheel; those of the robot file where they are not given. "
         "radius: m about the start; box: (xmin, xmax, ymin, ymax), m. rate: of the log to come, Hz, for a Robot. "
         "criterion: geometric_mean, mean or largest. guarantee: every_noise, or at_risk where errors average out "
         "(docs/risk.md), is the promise that is to be good; both are told. faults: name -> size asked for. The result "
-        "does not depend on "
-        "`threads`. The interpreter's lock is released; Ctrl-C ends the work.");
+        "does not depend on `threads`. The interpreter's lock is released; Ctrl-C ends the work.");
 }
 
 }  // namespace wheelwright::python

@@ -131,4 +131,6 @@ PYBIND11_MODULE(_core, m) {
   bind_margins(m);
   bind_gap(m);
   bind_sim(m);
+  bind_doctor(m);
+  bind_study(m);
 }

@@ -6,7 +6,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -19,13 +21,17 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <wheelwright/bounds/feasible_set.hpp>
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/core/log.hpp>
+#include <wheelwright/detector/detector.hpp>
 #include <wheelwright/files/json.hpp>
+#include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/model/robot.hpp>
+#include <wheelwright/robots/robot_file.hpp>
 
 namespace wheelwright::python {
 
@@ -123,6 +129,8 @@ void bind_detector(py::module_& m);
 void bind_margins(py::module_& m);
 void bind_gap(py::module_& m);
 void bind_sim(py::module_& m);
+void bind_doctor(py::module_& m);
+void bind_study(py::module_& m);
 
 /// A robot, and how its file was named (empty for one made in Python).
 struct RobotObject {
@@ -176,6 +184,72 @@ struct SetObject {
 /// `value` as dict, list, str, float, int, bool or None, exactly what a reader of its JSON text gets: NaN and infinity
 /// are None.
 [[nodiscard]] py::object to_python(const Json& value);
+
+/// Where the file of `robot` says that its logs have their columns; empty for a robot that is of no file.
+[[nodiscard]] robots::ColumnMap columns_of(const RobotObject& robot);
+
+/// Options of a reader for the columns that `robot` (nullptr: any) can use. Throws InputError where `map` names none of
+/// the log contract.
+[[nodiscard]] logs::LogOptions reader_options(const RobotObject* robot, const std::map<std::string, std::string>& map,
+                                              const std::vector<std::string>& extra);
+
+/// k of n.
+using Rule = std::optional<std::pair<std::size_t, std::size_t>>;
+
+/// Throws InvalidArgument for words that are none.
+[[nodiscard]] detector::DetectorOptions options_of(const std::string& set, const std::string& test,
+                                                   const Rule& persistence);
+
+/// A Commission of `result`, made of a log with the report `data`.
+[[nodiscard]] py::object commission_object(const Commissioning& result, const logs::LogReport& data);
+
+/// The model.json of a Commission; nothing for another object.
+[[nodiscard]] std::optional<Json> commission_json(const py::handle& object);
+
+/// The gap.json of a Diagnosis. Throws InvalidArgument for another object.
+[[nodiscard]] Json diagnosis_json(const py::handle& object);
+
+/// Adds to_dataframe() and what notebooks show, as the package's module _tables has them.
+template <typename Class>
+void tables_of(Class& bound) {
+  bound
+      .def(
+          "to_dataframe",
+          [](const py::object& self) { return py::module_::import("wheelwright._tables").attr("frame")(self); },
+          "Its table as a pandas.DataFrame. Raises Error where pandas is not installed.")
+      .def("_repr_html_",
+           [](const py::object& self) { return py::module_::import("wheelwright._tables").attr("html")(self); })
+      .def("__repr__",
+           [](const py::object& self) { return py::module_::import("wheelwright._tables").attr("line")(self); });
+}
+
+/// Adds summary, to_dict(), save() and tables_of() to a result with the members `json` and `summary`, the content of
+/// `kind`.json.
+template <typename Class>
+void result_of(Class& bound, const std::string& kind) {
+  using Object = typename Class::type;
+  const std::string content = "The content of " + kind + ".json (results/" + kind + ".schema.json).";
+  const std::string writes = "Writes " + kind + ".json, whole or not at all.";
+  bound
+      .def_property_readonly(
+          "summary", [](const Object& o) { return o.summary; }, "what the command line prints")
+      .def(
+          "to_dict", [](const Object& o) { return to_python(o.json); }, content.c_str())
+      .def(
+          "save", [](const Object& o, const std::filesystem::path& path) { files::write_json(path, o.json); },
+          py::arg("path"), writes.c_str());
+  tables_of(bound);
+}
+
+/// Adds these keys of `json` as attributes.
+template <typename Class>
+void members_of(Class& bound, const std::vector<const char*>& keys) {
+  using Object = typename Class::type;
+  for (const char* const key : keys) {
+    bound.def_property_readonly(
+        key, [key](const Object& o) { return to_python(o.json.at(key)); }, "as in to_dict()");
+  }
+}
 
 /// JSON of `json.dumps(value)`, parsed. Throws InvalidArgument, naming `what`, where it cannot be written.
 [[nodiscard]] Json to_json(const py::handle& value, const std::string& what);

@@ -124,6 +124,7 @@ std::string commission_report(const Commissioning& result, const ReportContext& 
   if (result.status != Commissioning::Status::empty) {
     content.warrant = result.model.warrant;
   }
+  content.sections = context.lead;
   const auto add = [&](const char* id, const char* heading, std::string body) {
     if (!body.empty()) {
       content.sections.push_back({id, heading, std::move(body)});

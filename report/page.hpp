@@ -28,6 +28,13 @@ struct ReportSeed {
   std::uint64_t value = 0;
 };
 
+/// A part of a page. `heading` is text, `body` is HTML.
+struct Section {
+  std::string id;
+  std::string heading;
+  std::string body;
+};
+
 /// Where a result came from. Every text may hold anything: it is escaped on the page.
 struct ReportContext {
   std::string title;                   ///< heading of the page; empty: a default with the robot's name
@@ -40,6 +47,7 @@ struct ReportContext {
   std::size_t rows = 0;               ///< of the log, where it has more of them than `signals`
   std::optional<Detection> own_log;   ///< commission_report: the model's detector on the log it was made from
   std::optional<commission::MarginSurvey> seen;  ///< commission_report: what is certain to be seen (first_look())
+  std::vector<Section> lead{};                   ///< commission_report: before its own sections
 };
 
 using words::TimeAxis;
@@ -129,13 +137,6 @@ inline constexpr std::size_t most_chart_points = 2'000'000;
 
 /// `text` as a JSON string that may stand inside a <script> element.
 [[nodiscard]] std::string json_string(std::string_view text);
-
-/// A part of a page. `heading` is text, `body` is HTML.
-struct Section {
-  std::string id;
-  std::string heading;
-  std::string body;
-};
 
 /// A whole page. It loads nothing: its content security policy forbids every request. `status` (one of "good",
 /// "caution", "bad") and `verdict` (text) head it, followed by `first` (HTML) and `sentences` (text).

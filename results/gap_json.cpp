@@ -257,8 +257,12 @@ void take_noise(const files::JsonPlace& root, const Model& model, gap::PlannedNo
 
 std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file, std::vector<Effect>& catalogue,
                                       const gap::Drive& drive, gap::PlannedNoise& noise) {
-  const Json json = files::read_json(file);
-  const files::JsonPlace root(json, file.string());
+  return rivals_of_gap(files::read_json(file), file.string(), catalogue, drive, noise);
+}
+
+std::vector<gap::Rival> rivals_of_gap(const Json& json, const std::string& file, std::vector<Effect>& catalogue,
+                                      const gap::Drive& drive, gap::PlannedNoise& noise) {
+  const files::JsonPlace root(json, file);
   if (root.at("schema").text() != "wheelwright/gap/1") {
     root.at("schema").fail("wheelwright/gap/1, a result of wheelwright gap");
   }
@@ -294,7 +298,7 @@ std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file, std::ve
     rivals.push_back(std::move(rival));
   }
   if (rivals.size() < 2) {
-    throw InputError(file.string() + ": /credible_set: expected at least two sets of causes to tell apart");
+    throw InputError(file + ": /credible_set: expected at least two sets of causes to tell apart");
   }
   return rivals;
 }

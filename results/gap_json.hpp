@@ -55,6 +55,11 @@ void write_residuals(const std::filesystem::path& path, const std::vector<gap::R
 [[nodiscard]] std::vector<gap::Rival> rivals_of_gap(const std::filesystem::path& file, std::vector<Effect>& catalogue,
                                                     const gap::Drive& drive, gap::PlannedNoise& noise);
 
+/// The same from JSON; `file` is for messages.
+[[nodiscard]] std::vector<gap::Rival> rivals_of_gap(const Json& json, const std::string& file,
+                                                    std::vector<Effect>& catalogue, const gap::Drive& drive,
+                                                    gap::PlannedNoise& noise);
+
 /// Adds the parameters of the rivals to the members of the credible set of a gap.json: `design --gap` begins from them.
 void add_rivals(Json& result, const gap::NextDrive& next);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace wheelwright::results {
@@ -34,6 +35,20 @@ doctor::ReaderCounts reader_counts(const logs::LogReport& report) {
           .duplicates = report.duplicates.count,
           .truncated = report.truncated.count,
           .unwrapped = report.angle_wraps.count};
+}
+
+doctor::LogHealth examine_first(logs::RecordedLog& log, const std::optional<Robot>& robot, std::size_t most) {
+  const LogTable table = doctor::first_rows(log, most);
+  doctor::LogHealth health = doctor::examine(table, robot, reader_counts(log.report()));
+  if (table.rows() < log.report().rows) {
+    health.findings.push_back(
+        {.id = "time.first_rows_only",
+         .severity = doctor::FindingSeverity::notice,
+         .sentence = fmt::format("Only the first {} of {} rows were looked at.", table.rows(), log.report().rows),
+         .next = "--rows N looks at more.",
+         .value = static_cast<double>(table.rows())});
+  }
+  return health;
 }
 
 Json to_json(const doctor::LogHealth& health, const HealthFiles& files) {

@@ -3,6 +3,8 @@
 /// doctor.json: the result of `wheelwright doctor`; and what a reader counted, as the examination takes it.
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +26,10 @@ struct HealthFiles {
 
 /// Defects that the reader of CSV logs dropped.
 [[nodiscard]] doctor::ReaderCounts reader_counts(const logs::LogReport& report);
+
+/// Examines the first `most` rows of `log` (doctor::examine); a finding says so where there are more.
+[[nodiscard]] doctor::LogHealth examine_first(logs::RecordedLog& log, const std::optional<Robot>& robot,
+                                              std::size_t most);
 
 /// The examination as JSON (results/doctor.schema.json), findings in their order.
 [[nodiscard]] Json to_json(const doctor::LogHealth& health, const HealthFiles& files);

@@ -355,4 +355,9 @@ std::string robot_yaml(const RobotWithOrigins& made) {
   return out;
 }
 
+Json to_json(const RobotWithOrigins& robot, const std::string& software) {
+  return {{"schema", "wheelwright/robot-file/1"}, {"software", software},     {"files", robot.files},
+          {"robot", to_json(robot.robot)},        {"origins", robot.origins}, {"remarks", robot.remarks}};
+}
+
 }  // namespace wheelwright::robots

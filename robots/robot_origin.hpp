@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/robots/robot_description.hpp>
 
@@ -49,6 +50,9 @@ struct RobotWithOrigins {
 /// Throws InputError, naming file, line and element, for what is missing, contradicts itself or makes no sense.
 [[nodiscard]] RobotWithOrigins robot_from(const RobotTree* description, const DriveFacts* controller,
                                           const RobotHints& hints = {});
+
+/// The robot, its origins and remarks as JSON (results/robot-file.schema.json); `software` is name and version.
+[[nodiscard]] Json to_json(const RobotWithOrigins& robot, const std::string& software);
 
 /// The text of a robot file with an origin behind every value as a comment. parse_robot makes the same Robot of it.
 [[nodiscard]] std::string robot_yaml(const RobotWithOrigins& robot);

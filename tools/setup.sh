@@ -26,7 +26,7 @@ everything="libopenmpi-dev openmpi-bin
 case "${1:-}" in
   program) everything= ;;
   '') ;;
-  --ci) everything="$everything clang clang-format clang-tidy python3-mypy python3-matplotlib
+  --ci) everything="$everything clang clang-format clang-tidy python3-mypy python3-matplotlib python3-pandas
     chromium zsh fish man-db groff-base" ;;
   --fuzz) everything="$everything clang-14 libclang-rt-14-dev" ;;
   --docs) everything="$everything python3-sphinx python3-myst-parser python3-sphinxcontrib.bibtex doxygen graphviz" ;;

@@ -9,15 +9,18 @@
 
 #include <wheelwright/commission/blind_watch.hpp>
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/commission/detector_choice.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/design/detection.hpp>
 #include <wheelwright/design/manoeuvre.hpp>
+#include <wheelwright/doctor/log_health.hpp>
 #include <wheelwright/gap/diagnosis.hpp>
 #include <wheelwright/gap/discrimination_design.hpp>
 #include <wheelwright/inference/identification.hpp>
 #include <wheelwright/study/bound_derivatives.hpp>
+#include <wheelwright/study/fleet_result.hpp>
 #include <wheelwright/study/study.hpp>
 
 namespace wheelwright::words {
@@ -34,6 +37,14 @@ namespace wheelwright::words {
 
 /// Summary of the kinematic residual for a terminal.
 [[nodiscard]] std::string summary(const commission::KinematicWatch& watch, const OnlineModel& model);
+
+/// The examination of a log for a terminal: findings, the gravest first (`all`: also what is as it should be), then the
+/// verdict.
+[[nodiscard]] std::string summary(const doctor::LogHealth& health, bool all = false);
+
+/// The choice for a terminal: a table of all candidates, the stated faults, what each guarantee decides, and
+/// `robot_file_line`, which asks for the chosen filter.
+[[nodiscard]] std::string summary(const commission::DetectorChoice& choice, const std::string& robot_file_line);
 
 /// Summary of the detector at a stated risk for a terminal; empty where the model says nothing at a risk.
 [[nodiscard]] std::string summary(const commission::RiskWatch& watch, const OnlineModel& model);
@@ -93,5 +104,8 @@ struct GapResults {
 /// elasticities; and what could not be evaluated.
 [[nodiscard]] std::string summary(const study::Study& study, const study::StudyResult& result,
                                   const std::optional<study::LocalSensitivity>& local);
+
+/// The fleet for a terminal: its sentences, then why logs failed, the most frequent reasons first.
+[[nodiscard]] std::string summary(const study::FleetResult& fleet);
 
 }  // namespace wheelwright::words

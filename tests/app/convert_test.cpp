@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `wheelwright convert`, as a user runs it: the same log in every format is the same log.
+#include <wheelwright/core/words.hpp>
+
 #include "app/program.hpp"
 
 namespace wheelwright::app::convert_test {
@@ -84,6 +86,57 @@ TEST_F(Convert, DetectWritesItsSeriesForOthersToPlot) {
     ASSERT_LE(lower, residual);
     ASSERT_LE(residual, upper);
   }
+}
+
+// A pose brings a second file, and both have layouts, whose every name is a topic and a field of the recordings.
+TEST_F(Convert, LayoutsShowWhatTheSeriesHave) {
+  for (const std::string name : {"healthy", "wheel_radius_fault"}) {
+    std::string scenario = bytes(examples() / "scenarios" / (name + ".yaml"));
+    core::replace_all(scenario, "../robot.yaml", "robot.yaml");
+    put(name + ".yaml", scenario);
+    ASSERT_EQ(run(fmt::format("simulate {0}.yaml --out {0}.csv --quiet", name)).code, 0);
+  }
+  ASSERT_EQ(run("commission healthy.csv --robot robot.yaml --out model --quiet").code, 0);
+  const Outcome done = run("detect wheel_radius_fault.csv --model model/model.json --series residual.mcap --layouts");
+  EXPECT_EQ(done.code, 1) << "the fault";
+  EXPECT_THAT(done.out, AllOf(HasSubstr("wrote residual.mcap"), HasSubstr("wrote residual_kinematic.mcap"),
+                              HasSubstr("wrote residual.plotjuggler.xml"), HasSubstr("wrote residual.foxglove.json")));
+
+  // The definitions stand unpacked in the summary at a recording's end.
+  const std::string recordings = bytes(path("residual.mcap")) + bytes(path("residual_kinematic.mcap"));
+  const Json layout = files::read_json(path("residual.foxglove.json"));
+  std::size_t curves = 0;
+  std::vector<std::string> panels;
+  for (const auto& [id, panel] : layout.at("configById").items()) {
+    panels.push_back(id);
+    for (const Json& path : panel.at("paths")) {
+      const std::string value = path.at("value").get<std::string>();
+      const std::size_t dot = value.find('.');
+      ASSERT_NE(dot, std::string::npos) << value;
+      EXPECT_NE(recordings.find(value.substr(0, dot)), std::string::npos) << value;
+      EXPECT_NE(recordings.find("float64 " + value.substr(dot + 1) + "\n"), std::string::npos) << value;
+      ++curves;
+    }
+  }
+  EXPECT_GE(curves, 16U) << "two outputs of the efforts and two or more of the pose, three lines and an alarm each";
+  const std::string placed = layout.at("layout").dump();
+  for (const std::string& panel : panels) {
+    EXPECT_THAT(placed, HasSubstr("\"" + panel + "\"")) << "every panel has its place";
+  }
+  const std::string juggler = bytes(path("residual.plotjuggler.xml"));
+  std::size_t named = 0;
+  for (std::size_t at = juggler.find("<curve name=\""); at != std::string::npos;
+       at = juggler.find("<curve name=\"", at + 1)) {
+    const std::string name = juggler.substr(at + 13, juggler.find('"', at + 13) - at - 13);
+    const std::size_t slash = name.rfind('/');
+    EXPECT_NE(recordings.find(name.substr(0, slash)), std::string::npos) << name;
+    EXPECT_NE(recordings.find("float64 " + name.substr(slash + 1) + "\n"), std::string::npos) << name;
+    ++named;
+  }
+  EXPECT_EQ(named, curves);
+  EXPECT_EQ(run("detect wheel_radius_fault.csv --model model/model.json --layouts").code, 2) << "of which series?";
+  EXPECT_EQ(run("detect wheel_radius_fault.csv --model model/model.json --series residual.mcap").code, 2)
+      << "it is there already";
 }
 
 }  // namespace

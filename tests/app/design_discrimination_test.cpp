@@ -27,7 +27,8 @@ TEST_F(DesignDiscrimination, TellsNamedCausesApart) {
       run(std::string(kDrive) + "--between coulomb --between caster_drag --size coulomb=0.2 --out plan");
   ASSERT_EQ(done.code, 0) << done.err;
   EXPECT_THAT(names_in("plan"),
-              ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "report.html"));
+              ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "manoeuvre_cmd_vel.csv",
+                                     "manoeuvre_cmd_vel.mcap", "report.html"));
   const Json design = files::read_json(path("plan/design.json"));
   EXPECT_EQ(design.at("for"), "discrimination");
   EXPECT_DOUBLE_EQ(design.at("rivals")[0].at("causes")[0].at("coefficients")[0].get<double>(), 0.2);

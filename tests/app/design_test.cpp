@@ -40,7 +40,8 @@ TEST_F(SlowDesign, DesignSimulateCommissionInARow) {
   const Outcome designed = run(std::string("design --robot robot.yaml --out plan") + kLimits);
   ASSERT_EQ(designed.code, 0) << designed.err;
   EXPECT_THAT(names_in("plan"),
-              ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "report.html"));
+              ::testing::ElementsAre("design.json", "figure_eight.csv", "manoeuvre.csv", "manoeuvre_cmd_vel.csv",
+                                     "manoeuvre_cmd_vel.mcap", "report.html"));
   EXPECT_EQ(testing::lines_of(bytes(path("plan/manoeuvre.csv"))).front(), "t,command_r,command_l,v1,v2,x,y,theta");
   const Json design = files::read_json(path("plan/design.json"));
   for (const auto& [limit, share] : design.at("use").items()) {
@@ -118,6 +119,59 @@ TEST_F(Design, TellsBothPromises) {
       run(std::string("design --robot sure.yaml --guarantee at-risk --duration 10 --stages 1") + kLimits);
   EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, AllOf(HasSubstr("--guarantee"), HasSubstr("bias")));
+}
+
+// The commands of speed and yaw rate, integrated here by themselves, end where the wheels' commands say; the recording has
+// the same numbers, and a robot whose lever arm is the whole track is not turned twice as fast.
+TEST_F(Design, ItsControllerIsGivenTheSameDrive) {
+  put("whole.yaml", bytes(path("robot.yaml")) + "lever_arm: track\n");
+  for (const std::string robot : {"robot", "whole"}) {
+    ASSERT_EQ(run("design --robot " + robot + ".yaml --out " + robot + " --duration 8 --stages 2" + kLimits).code, 0);
+    ASSERT_EQ(run("convert " + robot + "/manoeuvre_cmd_vel.mcap " + robot +
+                  ".csv --map omega_l=/cmd_vel_unstamped.linear.x --map omega_r=/cmd_vel_unstamped.angular.z --quiet")
+                  .code,
+              0);
+    const auto wheels = testing::lines_of(bytes(path(robot + "/manoeuvre.csv")));
+    const auto body = testing::lines_of(bytes(path(robot + "/manoeuvre_cmd_vel.csv")));
+    const auto played = testing::lines_of(bytes(path(robot + ".csv")));
+    ASSERT_EQ(wheels.size(), body.size());
+    ASSERT_EQ(played.size(), body.size());
+    double x = 0.0, y = 0.0, heading = 0.0, before = 0.0, speed = 0.0, rate = 0.0, turned = 0.0;
+    for (std::size_t k = 1; k < body.size(); ++k) {
+      double t = 0.0, v = 0.0, w = 0.0, again_t = 0.0, again_v = 0.0, again_w = 0.0;
+      ASSERT_EQ(std::sscanf(body[k].c_str(), "%lf,%lf,%lf", &t, &v, &w), 3);
+      ASSERT_EQ(std::sscanf(played[k].c_str(), "%lf,%lf,%lf", &again_t, &again_v, &again_w), 3) << played[k];
+      EXPECT_NEAR(again_t, t, 1e-9);
+      EXPECT_EQ(again_v, v);
+      EXPECT_EQ(again_w, w);
+      const double step = k > 1 ? t - before : 0.0, turn = 0.5 * step * (w + rate);
+      x += 0.5 * step * (v + speed) * std::cos(heading + 0.5 * turn);
+      y += 0.5 * step * (v + speed) * std::sin(heading + 0.5 * turn);
+      heading += turn;
+      turned = std::max(turned, std::abs(heading));
+      before = t;
+      speed = v;
+      rate = w;
+    }
+    EXPECT_EQ(speed, 0.0) << "it ends at rest";
+    EXPECT_GT(turned, 0.2);
+    double place[8] = {};
+    ASSERT_EQ(std::sscanf(wheels.back().c_str(), "%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", place, place + 1, place + 2,
+                          place + 3, place + 4, place + 5, place + 6, place + 7),
+              8);
+    EXPECT_NEAR(x, place[5], 1e-3) << robot;
+    EXPECT_NEAR(y, place[6], 1e-3) << robot;
+    EXPECT_NEAR(heading, place[7], 1e-6) << robot;
+  }
+}
+
+// A corner whose linear program failed asked for the same row for ever.
+TEST_F(Design, EndsAlsoWhereAPlanLeavesThinSets) {
+  commission_shipped();
+  const Outcome done = run(
+      "design --model model/model.json --for bounds --speed 8 --acceleration 20 --radius 1.5 --duration 10 --stages 2",
+      "/dev/null", "timeout 200");
+  EXPECT_EQ(done.code, 0) << done.err;
 }
 
 TEST_F(Design, WhatIsMissingIsAskedFor) {

@@ -140,6 +140,33 @@ TEST_F(Robust, ALogOfWhichMostCannotBeDecidedIsNotHealthy) {
               HasSubstr("column tau_l"));
 }
 
+TEST_F(Robust, AStreamSaysThatItIsWatchedAndKeepsItsEvents) {
+  commission_shipped();
+  put_lines("log.csv", healthy_lines());
+  const std::string follow = "detect --follow --model model/model.json --heartbeat 30 --out watch";
+  const Outcome text = run(follow, "log.csv");
+  EXPECT_EQ(text.code, 0) << text.err;
+  EXPECT_THAT(text.out,
+              AllOf(HasSubstr("watching at 30 s: 3001 rows, "), HasSubstr("watching at 120 s: 12001 rows, ")));
+  EXPECT_EQ(testing::lines_of(text.out).size(), 4U);
+  const Outcome json = run(follow + " --json", "log.csv");
+  EXPECT_EQ(json.code, 0) << json.err;
+  // Both runs, each behind a line that says what it is.
+  const std::vector<std::string> kept = testing::lines_of(bytes(path("watch/events.jsonl")));
+  ASSERT_EQ(kept.size(), 10U);
+  for (const std::size_t first : {std::size_t{0}, std::size_t{5}}) {
+    EXPECT_EQ(Json::parse(kept[first]).at("schema"), "wheelwright/events/1");
+    EXPECT_EQ(Json::parse(kept[first + 1]).at("watching").at("t"), 30.0);
+    EXPECT_FALSE(Json::parse(kept[first + 4]).at("watching").at("blind").get<bool>());
+  }
+  EXPECT_EQ(json.out, kept[6] + "\n" + kept[7] + "\n" + kept[8] + "\n" + kept[9] + "\n");
+
+  put("watch/events.jsonl", "mine\n");
+  EXPECT_EQ(run(follow, "log.csv").code, 2) << "a file of somebody else's";
+  EXPECT_EQ(bytes(path("watch/events.jsonl")), "mine\n");
+  EXPECT_EQ(run("detect --follow --model model/model.json --out /dev/full/x", "log.csv").code, 2);
+}
+
 TEST_F(Robust, ALineWithoutEndEndsTheStreamBeforeItFillsTheMemory) {
   commission_shipped();
   put("log.csv", healthy_lines().front() + "\n" + std::string(std::size_t{1} << 20, '1'));

@@ -17,6 +17,20 @@ HEALTHY = SOURCE / "examples" / "healthy.csv.gz"
 SCENARIOS = SOURCE / "examples" / "scenarios"
 
 
+_URDF = """<robot name="cart">
+  <link name="base"><inertial><mass value="10"/><inertia ixx="0.2" iyy="0.3" izz="0.4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  {}
+</robot>
+"""
+_WHEEL = """<link name="{0}"><inertial><mass value="0.5"/><inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/>
+    </inertial><collision><origin rpy="1.5707963267948966 0 0"/><geometry><cylinder radius="0.05" length="0.02"/></geometry>
+    </collision></link>
+  <joint name="{0}_joint" type="continuous"><parent link="base"/><child link="{0}"/><origin xyz="0 {1} 0"/><axis xyz="0 1 0"/>
+    <limit effort="6" velocity="30"/></joint>"""
+# A cart on two driven wheels, 0.4 m apart.
+CART = _URDF.format(_WHEEL.format("left", 0.2) + _WHEEL.format("right", -0.2))
+
+
 def program(*arguments):
     """What `wheelwright ARGUMENTS --json` prints, as Python reads it."""
     command = [PROGRAM, *map(str, arguments), "--json"]
@@ -33,6 +47,13 @@ def robot():
 
 def healthy_log():
     return ww.read_log(HEALTHY, robot())
+
+
+def straight_log():
+    """The shipped log as if both wheels had done what the right one did: nothing turns."""
+    columns = healthy_log().to_arrays()
+    columns.update({name: columns[name.replace("_l", "_r")] for name in columns if name.endswith("_l")})
+    return ww.Log(columns, robot())
 
 
 @functools.lru_cache(maxsize=None)

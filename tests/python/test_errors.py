@@ -88,7 +88,9 @@ class Progress(unittest.TestCase):
                      lambda: ww.margins(healthy_log(), commissioned().model, threads=2, progress=refuse),
                      lambda: ww.design(commissioned().model, speed=8.0, acceleration=20.0, threads=2,
                                        progress=refuse),
-                     lambda: ww.identify(healthy_log(), robot(), shapes=False, progress=refuse)):
+                     lambda: ww.identify(healthy_log(), robot(), shapes=False, progress=refuse),
+                     lambda: ww.choose(healthy_log(), robot(), progress=refuse),
+                     lambda: ww.fleet([HEALTHY], robot(), threads=2, progress=refuse)):
             with self.assertRaises(Enough):
                 work()
 

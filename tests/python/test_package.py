@@ -21,7 +21,7 @@ from pathlib import Path
 
 import wheelwright as ww
 import wheelwright._core as core
-from support import HEALTHY, ROBOT, SOURCE, fault_file, path
+from support import CART, HEALTHY, ROBOT, SOURCE, fault_file, path
 
 PACKAGE = Path(ww.__file__).parent
 
@@ -93,11 +93,14 @@ class Types(unittest.TestCase):
             self.skipTest("mypy is not installed")
         return run(*arguments, MYPYPATH=str(PACKAGE.parent), MYPY_CACHE_DIR=str(path("mypy")))
 
-    def test_the_example_is_strictly_typed(self):
-        # matplotlib 3.6 has no types.
-        path("mypy.ini").write_text("[mypy]\nstrict = True\n[mypy-matplotlib.*]\nignore_missing_imports = True\n")
-        done = self.mypy("-m", "mypy", "--config-file", path("mypy.ini"), SOURCE / "examples" / "commission_a_bag.py")
+    def test_package_and_examples_are_strictly_typed(self):
+        # matplotlib 3.6 and pandas 1.5 have no types.
+        path("mypy.ini").write_text("[mypy]\nstrict = True\n[mypy-matplotlib.*,pandas.*]\nignore_missing_imports = True\n")
+        done = self.mypy("-m", "mypy", "--config-file", path("mypy.ini"), "-p", "wheelwright")
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        for example in ("commission_a_bag.py", "morning.py"):
+            done = self.mypy("-m", "mypy", "--config-file", path("mypy.ini"), SOURCE / "examples" / example)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
     def test_wrong_use_is_found(self):
         path("wrong.py").write_text("import wheelwright as ww\n"
@@ -115,17 +118,22 @@ class Types(unittest.TestCase):
 
 
 class Page(unittest.TestCase):
-    def test_its_first_example_runs(self):
+    def test_its_first_examples_run(self):
         page = (SOURCE / "docs" / "python.md").read_text()
-        code = re.search(r"((?:^ {4}.*\n|^\n)+)", page[page.index("    import numpy"):], re.M).group(1)
+        code = "".join(re.search(r"((?:^ {4}.*\n|^\n)+)", page[page.index(first):], re.M).group(1)
+                       for first in ("    import numpy", "    health = "))
         # As it stands there it takes ten seconds.
-        for quick, options in (("baseline=log", "shrink=False, manoeuvre=False"), ("radius=1.5", "stages=1, duration=6.0")):
+        for quick, options in (("baseline=log", "shrink=False, manoeuvre=False"), ("radius=1.5", "stages=1, duration=6.0"),
+                               ('"caster_drag"], speed=8.0', "stages=1, duration=6.0")):
             self.assertIn(quick, code)
             code = code.replace(quick, f"{quick}, {options}")
         place = path("page")
         place.mkdir()
         for name, source in (("robot.yaml", ROBOT), ("monday.csv.gz", HEALTHY), ("today.csv", fault_file())):
             shutil.copy(source, place / name)
+        (place / "cart.urdf").write_text(CART)
+        (place / "study.yaml").write_text("log: monday.csv.gz\nrobot: robot.yaml\ninputs: {wheel_radius: {relative: [-0.01, "
+                                          "0.01]}}\nquantities: [width]\nmethods: {one_at_a_time: {levels: 2}}\n")
         names = {}
         before = os.getcwd()
         os.chdir(place)
@@ -137,6 +145,8 @@ class Page(unittest.TestCase):
         self.assertTrue(names["run"].fault and names["found"].fault)
         self.assertTrue((place / "model.json").exists())
         self.assertIn("command_r", names["plan"])
+        self.assertTrue(names["health"].fit)
+        self.assertEqual(names["cart"].to_dict()["track_width"], 0.4)
 
 
 class Wheel(unittest.TestCase):

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Two commissioned models of one kind of robot against each other: what has changed for certain between their logs,
+/// which parameters explain it, and what could have changed unseen.
+///
+/// Let P and Q be the sets of parameters that the two logs allow. Where their assumptions hold the true θ of the first
+/// is in P and the true θ' of the second in Q. So θ'_j − θ_j lies between min Q_j − max P_j and max Q_j − min P_j,
+/// whatever else has changed; and where P ∩ Q is proved empty something has changed, although every interval of the one
+/// may overlap that of the other. A set S of parameters explains a change alone when
+///
+///     { (θ, θ') : θ in P, θ' in Q, θ'_j = θ_j for all j outside S }
+///
+/// is not proved empty; the true set of changed parameters is never among those that are refused.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <wheelwright/bounds/box.hpp>
+#include <wheelwright/bounds/slab_rows.hpp>
+#include <wheelwright/core/interval.hpp>
+#include <wheelwright/core/warrant.hpp>
+#include <wheelwright/detector/online_model.hpp>
+
+namespace wheelwright::commission {
+
+/// One parameter, or the physical quantity behind it, in two sets. Intervals are rounded outward.
+struct ParameterChange {
+  std::string name;      ///< of θ's entry, e.g. "r_mass"
+  std::string quantity;  ///< that the intervals are of: the physical one where both robot files tell one scale, e.g.
+                         ///< "mass"; else the name
+  std::string unit;
+  Interval before, after;
+  Interval change;                   ///< holds after − before, whatever else has changed
+  std::optional<Interval> together;  ///< where one θ explains both logs: bounds of both, if nothing has changed
+
+  /// True if it has changed whatever else has.
+  [[nodiscard]] bool certain() const { return change.lower > 0.0 || change.upper < 0.0; }
+};
+
+/// Parameters that explain a change when all others stay.
+struct ChangeExplanation {
+  std::vector<std::size_t> parameters;  ///< ascending
+  std::vector<Interval> change;         ///< of each, in the unit of its ParameterChange: holds after − before
+};
+
+/// Result for one pair of sets.
+struct SetComparison {
+  bool wheels = false;         ///< of wheel radii and yaw gains; else of θ_L
+  std::optional<double> risk;  ///< that one of the two sets lacks its truth; nothing: for every noise within its bounds
+  core::Warrant warrant = core::Warrant::extrapolated;  ///< the weaker of both
+  bool compatible = true;                               ///< not proved: no one θ is in both sets
+  std::vector<ParameterChange> parameters;
+  std::vector<ChangeExplanation> explanations;  ///< where not compatible: all of the smallest number of parameters
+  std::size_t sought = 0;                       ///< largest number of parameters at once that was tried
+};
+
+/// Result of compare_models(): the sets that both models have.
+struct ModelComparison {
+  std::vector<SetComparison> sets;
+
+  /// The sets that tell a change, in their order: for every noise before a stated risk.
+  [[nodiscard]] std::vector<const SetComparison*> telling() const;
+  /// True if something has changed: for certain, or but for the stated risk.
+  [[nodiscard]] bool changed() const { return !telling().empty(); }
+};
+
+/// What a set of parameters is compared by.
+struct ParameterSet {
+  const std::vector<bounds::HalfSpace>& facets;
+  const Box& box;
+};
+
+/// Compares { θ in box : facets } of two logs. Sets S are tried from single parameters on, until a number of them
+/// explains, or `most_sets` sets would be passed. `parameters` get their intervals, names apart. Throws InvalidArgument
+/// unless the dimensions agree.
+[[nodiscard]] SetComparison compare_sets(const ParameterSet& before, const ParameterSet& after,
+                                         std::size_t most_sets = 250);
+
+/// Compares all that two models have in common. Throws InvalidArgument, naming what differs, unless θ means the same in
+/// both: kind of robot, parameters, geometry, unit of the efforts.
+[[nodiscard]] ModelComparison compare_models(const detector::OnlineModel& before, const detector::OnlineModel& after);
+
+}  // namespace wheelwright::commission

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <wheelwright/results/fleet_logs.hpp>
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <wheelwright/core/error.hpp>
+#include <wheelwright/results/health_json.hpp>
+#include <wheelwright/robots/robot_file.hpp>
+
+namespace wheelwright::results {
+
+SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot, logs::LogOptions reader,
+                        const std::vector<std::string>& despite, WheelPose pose) {
+  reader.only = robots::useful_columns(robot);
+  SoundLog out;
+  out.log = logs::open_log(paths, reader);
+  const doctor::LogHealth health =
+      doctor::examine(doctor::first_rows(*out.log, kExaminedRows), robot, reader_counts(out.log->report()));
+  std::string wrong;
+  std::vector<std::string> names;
+  for (const doctor::LogFinding& finding : health.findings) {
+    if (finding.severity != doctor::FindingSeverity::fatal || finding.topic != doctor::FindingTopic::units) {
+      continue;
+    }
+    if (std::ranges::count(despite, finding.id) > 0) {
+      out.remarks.push_back(fmt::format("passed over {}: {}", finding.id, finding.sentence));
+      continue;
+    }
+    wrong += fmt::format("\n  {}: {} {}", finding.id, finding.sentence, finding.next);
+    if (std::ranges::count(names, finding.id) == 0) {
+      names.push_back(finding.id);
+    }
+  }
+  if (!wrong.empty()) {
+    throw InputError(
+        fmt::format("{}: the log does not fit the robot file:{}\n`wheelwright doctor` says more; "
+                    "--despite {} goes on all the same",
+                    paths.front().string(), wrong, fmt::join(names, " --despite ")));
+  }
+  const doctor::LogFinding* repeats = health.find("signals.pose_repeats_wheels");
+  if (repeats != nullptr && pose == WheelPose::hidden) {
+    std::erase_if(*reader.only,
+                  [&](const std::string& name) { return std::ranges::count(repeats->columns, name) > 0; });
+    out.log = logs::open_log(paths, reader);
+    out.remarks.push_back(fmt::format("{} It is not used.", repeats->sentence));
+  }
+  return out;
+}
+
+namespace {
+
+std::vector<std::string> names_of_columns() {
+  std::vector<std::string> names;
+  for (const logs::LogColumn& column : logs::log_columns()) {
+    names.push_back(column.name);
+  }
+  return names;
+}
+
+study::FleetLog log_of(const robots::FleetListRobot& robot, const std::vector<robots::FleetListLog>& logs,
+                       const FleetReading& reading) {
+  study::FleetLog out;
+  std::vector<std::filesystem::path> paths;
+  for (const robots::FleetListLog& log : logs) {
+    out.name += (out.name.empty() ? "" : ", ") + log.path.string();
+    paths.push_back(log.path);
+  }
+  out.when = logs.empty() ? 0.0 : logs.front().when;
+  out.open = [file = robot.robot_file, &reading, paths] {
+    if (paths.empty()) {
+      throw InputError("no log to commission with: expected one with the role commission, or none");
+    }
+    if (file.empty() && !reading.robot) {
+      throw InputError("no robot file: expected --robot, or a robot.yaml or robot_file of its own");
+    }
+    const Robot declared = file.empty() ? *reading.robot : read_robot(file);
+    logs::LogOptions options = reading.reader;
+    options.map = file.empty() ? reading.columns : robots::read_columns(file, names_of_columns());
+    for (const auto& [name, column] : reading.reader.map) {
+      options.map[name] = column;
+    }
+    auto log = open_sound_log(paths, declared, std::move(options), reading.despite, WheelPose::judged).log;
+    logs::require_columns(*log, robots::needed_columns(declared));
+    Robot robot_with_errors = model::with_column_errors(declared, logs::interpolation_errors(log->report()));
+    return study::OpenedLog{std::move(log), std::move(robot_with_errors)};
+  };
+  return out;
+}
+
+}  // namespace
+
+study::RobotLogs logs_of(const robots::FleetListRobot& robot, const FleetReading& reading) {
+  study::RobotLogs logs{.robot = robot.name,
+                        .dated = robot.dated,
+                        .commissioning = log_of(robot, robot.commission, reading),
+                        .findings = robot.findings};
+  for (const robots::FleetListLog& check : robot.checks) {
+    logs.checks.push_back(log_of(robot, {check}, reading));
+  }
+  return logs;
+}
+
+}  // namespace wheelwright::results

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Two models against each other in words, the same for terminal and page.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <wheelwright/commission/model_comparison.hpp>
+
+namespace wheelwright::words {
+
+/// "0.8 to 2.1 kg more", "0.8 to 2.1 kg less"; "at most 0.3 kg less, at most 0.5 kg more" where 0 lies inside. Rounded
+/// outward.
+[[nodiscard]] std::string change_words(const Interval& change, const std::string& unit);
+
+/// Which set it is: "guaranteed", "at a risk of 2e-09", with the wheels' named.
+[[nodiscard]] std::string set_words(const commission::SetComparison& sets);
+
+/// The answer in one sentence.
+[[nodiscard]] std::string verdict(const commission::ModelComparison& comparison);
+
+/// "mass, kg".
+[[nodiscard]] std::string quantity_words(const commission::ParameterChange& parameter);
+
+/// What explains the change, a sentence for each explanation of each set that tells one; empty where none does.
+[[nodiscard]] std::vector<std::string> explanations(const commission::ModelComparison& comparison);
+
+/// The whole for a terminal: verdict, explanations, a table for each set.
+[[nodiscard]] std::string summary(const commission::ModelComparison& comparison);
+
+}  // namespace wheelwright::words
