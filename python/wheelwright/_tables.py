@@ -256,8 +256,9 @@ def _comparison_rows(c: core.ModelComparison) -> Iterable[tuple[dict[str, Any], 
 
 
 def _comparison(c: core.ModelComparison) -> Shown:
-    rows = (Row(f"{p['quantity']} ({s['of']}{'' if s['risk'] is None else ', at a risk'})", None, tuple(p["change"]), p["unit"],
-                "changed" if p["certain"] else "") for s, p in _comparison_rows(c))
+    rows = (Row(f"{p['quantity']} ({s['of']}{'' if s['risk'] is None else ', at a risk'})", None,
+                (p["change"][0], p["change"][1]), p["unit"], "changed" if p["certain"] else "")
+            for s, p in _comparison_rows(c))
     return Shown(c.message, rows)
 
 
