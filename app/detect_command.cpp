@@ -115,8 +115,14 @@ int run(const Arguments& a) {
       make_directory(a.common);
       how.events = a.common.out / "events.jsonl";
       keep_existing(a.common, how.events, kEventsSchema);
+      if (a.common.force) {
+        std::filesystem::remove(how.events);
+      }
     }
     return follow(STDIN_FILENO, std::cout, std::move(detector), model, a.detector, reader, how);
+  }
+  if (a.heartbeat > 0.0) {
+    throw InputError("--heartbeat: expected --follow, which it is of");
   }
   if (a.log.empty()) {
     throw InputError("detect: expected a LOG, or --follow to read rows from standard input");

@@ -87,11 +87,14 @@ class Selector {
       search.allowed[e] = !moves_theta_only_[e] && !does_nothing_[e];
     }
     const std::vector<std::vector<CauseSet>> levels = search_causes(table_, search);
-    const CauseSet& nothing = levels[0][0];
+    const CauseSet& refitted = levels[0][0];
     const auto compared = static_cast<double>(table_.spaces == nullptr ? (table_.gram->rows().array() > 0.0).count()
-                                                                       : losses(nothing).size());
+                                                                       : losses(refitted).size());
     result.enough_time = enough_time_ = std::exp2(-compared) < level_;
-    const CauseSet nominal = nominal_trusted ? evaluate(table_, {}, BaseModel::nominal) : nothing;
+    const CauseSet nominal = nominal_trusted ? evaluate(table_, {}, BaseModel::nominal) : refitted;
+    // A log that does not excite θ tells a worse one than is known: what that leaves, held out, is no gap.
+    nominal_is_better_ = nominal.held_out_error < refitted.held_out_error;
+    const CauseSet& nothing = nominal_is_better_ ? nominal : refitted;
     result.refitted_excess = nothing.held_out_error - floor_;
     result.nominal_excess = nominal.held_out_error - floor_;
     gap_ = std::max({result.refitted_excess, result.nominal_excess, 0.0});
@@ -154,12 +157,12 @@ class Selector {
     return signed_rank(savings) > core::normal_upper_quantile(level) || sign_flip_p(savings, options_.seed) < level;
   }
 
-  // What the set, θ fitted again, leaves of each stretch of time.
+  // What the set leaves of each stretch of time: θ fitted again, but for no causes where the nominal one does better.
   [[nodiscard]] Eigen::VectorXd losses(const CauseSet& set) const {
+    const BaseModel base = nominal_is_better_ && set.members.empty() ? BaseModel::nominal : BaseModel::refitted;
     return table_.spaces == nullptr
                ? set.loss
-               : held_out_pieces(*table_.gram, *table_.spaces, subset_of(table_, set.members, BaseModel::refitted),
-                                 options_.piece);
+               : held_out_pieces(*table_.gram, *table_.spaces, subset_of(table_, set.members, base), options_.piece);
   }
 
   // The set without those of its members that it does as well without.
@@ -603,6 +606,7 @@ class Selector {
   SelectionOptions options_;
   double level_ = 0.0;                  // of a test
   bool enough_time_ = true;             // Selection::enough_time
+  bool nominal_is_better_ = false;      // without causes, held out
   std::vector<bool> moves_theta_only_;  // by effect: θ fitted again takes all of it
   std::vector<bool> does_nothing_;      // by effect: all of its columns are zeros
   double gap_ = 0.0;

@@ -73,7 +73,7 @@ struct Selection {
   CauseSet all;         ///< with the parametric causes, θ nominal (as `structural` where no θ is trusted)
   std::vector<CredibleSet> credible;  ///< alternatives to `all`, itself first; best first
   double nominal_excess = 0.0;   ///< of M0 with θ nominal, above the floor; the refitted one where none is trusted
-  double refitted_excess = 0.0;  ///< of M0 with θ fitted again
+  double refitted_excess = 0.0;  ///< of M0 with θ fitted again, or nominal where that leaves less
   double left = 0.0;             ///< excess of `structural`
   BaseModel base = BaseModel::refitted;  ///< what `all` was judged with
   bool theta_moved = false;              ///< θ differs from nominal and no parametric cause says why

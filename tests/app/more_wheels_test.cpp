@@ -79,6 +79,23 @@ TEST_F(SkidSteer, AHealthyRobotIsNotSaidToHaveChanged) {
   EXPECT_EQ(gap("again", "measured").at("verdict"), "no_gap");
 }
 
+// A drive at constant speed hardly excites the mass: fitted again it is worse than known, and what that left, held out, was a
+// gap without a cause in 13 of 13 such drives.
+TEST_F(SkidSteer, ADriveThatExcitesLittleIsNoGap) {
+  drive("healthy", 5);
+  std::string eight = bytes(path("healthy.yaml"));
+  core::replace_all(eight, "{kind: commissioning, speed: 0.6, yaw_rate: 1.2, period: 8}",
+                    "{kind: figure_eight, speed: 0.6, period: 12}");
+  put("eight.yaml", eight);
+  for (const std::string robot : {"robot", "measured"}) {
+    for (const int seed : {1, 2, 3}) {
+      ASSERT_EQ(run(fmt::format("simulate eight.yaml --seed {} --out eight.csv --quiet --force", seed)).code, 0);
+      const Json found = gap("eight", robot);
+      EXPECT_EQ(found.at("verdict"), "no_gap") << robot << seed << found.at("summary");
+    }
+  }
+}
+
 TEST_F(SkidSteer, ALoadIsToldWithEitherTrack) {
   drive("healthy", 5);
   drive("loaded", 6, "23.0");

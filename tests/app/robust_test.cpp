@@ -164,6 +164,9 @@ TEST_F(Robust, AStreamSaysThatItIsWatchedAndKeepsItsEvents) {
   put("watch/events.jsonl", "mine\n");
   EXPECT_EQ(run(follow, "log.csv").code, 2) << "a file of somebody else's";
   EXPECT_EQ(bytes(path("watch/events.jsonl")), "mine\n");
+  EXPECT_EQ(run(follow + " --force", "log.csv").code, 0);
+  EXPECT_EQ(testing::lines_of(bytes(path("watch/events.jsonl"))).size(), 5U);
+  EXPECT_EQ(run("detect log.csv --model model/model.json --heartbeat 30").code, 2);
   EXPECT_EQ(run("detect --follow --model model/model.json --out /dev/full/x", "log.csv").code, 2);
 }
 
