@@ -45,14 +45,6 @@ int finished(int code) {
   return kBadInput;
 }
 
-std::vector<std::string> log_column_names() {
-  std::vector<std::string> names;
-  for (const logs::LogColumn& column : logs::log_columns()) {
-    names.push_back(column.name);
-  }
-  return names;
-}
-
 logs::LogOptions reader_options(const CommonOptions& options) {
   logs::LogOptions reader;
   reader.msg_path = options.msg_path;
@@ -65,7 +57,7 @@ logs::LogOptions reader_options(const CommonOptions& options) {
     }
     const std::string name = entry.substr(0, at);
     if (logs::find_log_column(name) == nullptr) {
-      const std::vector<std::string> names = log_column_names();
+      const std::vector<std::string> names = logs::log_column_names();
       throw InputError("--map '" + entry + "': " + files::shown(name) + " is no column of a log: expected one of " +
                        core::listed(names) + files::did_you_mean(name, names));
     }

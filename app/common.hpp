@@ -74,9 +74,6 @@ void tell(fmt::format_string<Values...> text, Values&&... values) {
 /// take all of the result.
 [[nodiscard]] int finished(int code);
 
-/// Names of all columns of the log contract.
-[[nodiscard]] std::vector<std::string> log_column_names();
-
 /// --map as reader options. Throws InputError where an entry is not name=column, or its name none of the log contract.
 [[nodiscard]] logs::LogOptions reader_options(const CommonOptions& options);
 

@@ -267,26 +267,16 @@ int run(const Arguments& a) {
     tell(a, words + fmt::format("  these promises are {}\n", core::warrant_word(subject.warrant)));
   };
   if (detection) {
-    // An evaluation walks the plan once for each fault: fewer of them than for bounds.
-    options.samples = 150;
-    options.descents = 3;
-    options.steps = 250;
-    const design::DetectionDesign design =
-        design::design_for_detection(*model, subject, limits, inspected(a, *model), options);
+    const design::DetectionDesign design = design::design_for_detection(
+        *model, subject, limits, inspected(a, *model), design::sized_for(design::PlanCost::walk_each, options));
     finish(results::to_json(design, limits), design, summary(design));
   } else if (a.aim == "discrimination") {
-    options.samples = 150;
-    options.descents = 3;
-    options.steps = 250;
-    const gap::DiscriminationDesign design = discriminate(a, subject, limits, options);
+    const gap::DiscriminationDesign design =
+        discriminate(a, subject, limits, design::sized_for(design::PlanCost::walk_each, options));
     finish(results::to_json(design, limits), design, summary(design));
   } else {
-    if (a.guarantee == design::Promise::at_risk) {  // an evaluation walks the plan five times
-      options.samples = 120;
-      options.descents = 2;
-      options.steps = 150;
-    }
-    const design::BoundsDesign design = design::design_for_bounds(subject, limits, a.criterion, options);
+    const design::BoundsDesign design = design::design_for_bounds(
+        subject, limits, a.criterion, design::sized_for(design::cost_of_bounds(a.guarantee), options));
     finish(results::to_json(design, subject, limits), design, summary(design, subject));
   }
   return kDone;

@@ -87,17 +87,25 @@ std::vector<std::filesystem::path> series_files(const Arguments& a, const Online
   return files;
 }
 
-void write_all_series(const Arguments& a, logs::RecordedLog& log, const OnlineModel& model, bool kinematic) {
+// Returns the files that were written.
+std::vector<std::filesystem::path> write_all_series(const Arguments& a, logs::RecordedLog& log,
+                                                    const OnlineModel& model, bool kinematic) {
   const double origin = log.report().files.front().time_origin;
   std::vector<Series> series = {write_series(a.series, log, model, a.detector, origin)};
   if (kinematic) {
     series.push_back(write_series(kinematic_series(a.series), log, *model.kinematic, a.detector, origin));
   }
+  std::vector<std::filesystem::path> written;
+  for (const Series& each : series) {
+    written.push_back(each.path);
+  }
   if (a.layouts) {
     const std::vector<std::filesystem::path> files = layout_files(a.series);
     files::atomic_write(files[0], plotjuggler_layout(series));
     files::atomic_write(files[1], foxglove_layout(series));
+    written.insert(written.end(), files.begin(), files.end());
   }
+  return written;
 }
 
 int run(const Arguments& a) {
@@ -173,8 +181,9 @@ int run(const Arguments& a) {
     }
     publish(a.common, json, "detection.json", page);
   }
+  std::vector<std::filesystem::path> series;
   if (!a.series.empty()) {
-    write_all_series(a, log, model, kinematic.detection.has_value());
+    series = write_all_series(a, log, model, kinematic.detection.has_value());
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
@@ -182,12 +191,8 @@ int run(const Arguments& a) {
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "detection.json").string(), (a.common.out / "report.html").string());
     }
-    if (!a.series.empty()) {
-      for (const std::filesystem::path& file : series_files(a, model)) {
-        if (std::filesystem::exists(file)) {
-          say("wrote {}\n", file.string());
-        }
-      }
+    for (const std::filesystem::path& file : series) {
+      say("wrote {}\n", file.string());
     }
   }
   if (!undecided.empty()) {

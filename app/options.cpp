@@ -37,7 +37,7 @@ void add_common(CLI::App& command, CommonOptions& options) {
 
 void take_columns(const std::filesystem::path& file, CommonOptions& options) {
   if (!file.empty()) {
-    options.columns = robots::read_columns(file, log_column_names());
+    options.columns = robots::read_columns(file, logs::log_column_names());
   }
 }
 

@@ -113,6 +113,19 @@ std::vector<double> by_turns(std::size_t stages, std::size_t joints) {
 
 }  // namespace
 
+DesignOptions sized_for(PlanCost cost, DesignOptions options) {
+  if (cost == PlanCost::five_walks) {
+    options.samples = 120;
+    options.descents = 2;
+    options.steps = 150;
+  } else if (cost == PlanCost::walk_each) {
+    options.samples = 150;
+    options.descents = 3;
+    options.steps = 250;
+  }
+  return options;
+}
+
 Manoeuvre design_manoeuvre(const DesignSubject& subject, const MotionLimits& limits, const RowObjective& objective,
                            const DesignOptions& options) {
   return design_manoeuvre(subject, limits, of_rows(objective, subject), options);

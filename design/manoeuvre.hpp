@@ -55,6 +55,21 @@ struct DesignOptions {
   std::function<void(std::string_view stage, double share)> progress = {};  ///< may be empty
 };
 
+/// What the objective asks of one plan.
+enum class PlanCost {
+  one_walk,    ///< of the plan: bounds
+  five_walks,  ///< bounds at a stated risk
+  walk_each,   ///< one for each fault, or for each rival
+};
+
+/// The cost of bounds under that promise.
+[[nodiscard]] constexpr PlanCost cost_of_bounds(Promise promise) {
+  return promise == Promise::at_risk ? PlanCost::five_walks : PlanCost::one_walk;
+}
+
+/// `options` with the size of search that commands take for objectives of that cost.
+[[nodiscard]] DesignOptions sized_for(PlanCost cost, DesignOptions options);
+
 /// A designed manoeuvre.
 struct Manoeuvre {
   Plan plan;                    ///< sampled every DesignSubject::step

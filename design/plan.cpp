@@ -178,13 +178,8 @@ LogTable command_table(const Plan& plan, const Model& model) {
 }
 
 LogTable velocity_table(const LogTable& commands, const Robot& robot) {
-  const auto column = [&](const char* name) -> const std::vector<double>& {
-    const auto found = std::ranges::find(commands.names, name);
-    check::that(found != commands.names.end(), "velocity_table", "the columns command_r and command_l");
-    return commands.columns[static_cast<std::size_t>(found - commands.names.begin())];
-  };
-  const std::vector<double>& right = column("command_r");
-  const std::vector<double>& left = column("command_l");
+  const std::vector<double>& right = commands.column("command_r");
+  const std::vector<double>& left = commands.column("command_l");
   LogTable table;
   table.t = commands.t;
   table.segment_starts = commands.segment_starts;

@@ -185,8 +185,10 @@ struct BaselineFit {
 };
 
 // Columns of effects grow with θ: those of the first fit are of the θ that it corrects. Fits what was found again about
-// itself until it stays, so that another drive, whose columns are made of the final θ, finds the same robot.
-void settle(PreparedGap& prepared, const NoiseFloor& sensors, const BlockOptions& blocks, BaselineFit& last) {
+// itself until it stays, so that another drive, whose columns are made of the final θ, finds the same robot. `found`:
+// where in the catalogue each of the healthy effects stands.
+void settle(PreparedGap& prepared, const std::vector<std::size_t>& found, const NoiseFloor& sensors,
+            const BlockOptions& blocks, BaselineFit& last) {
   constexpr int rounds = 30;
   constexpr double enough = 1e-6;  // of each parameter
   Drive& drive = *prepared.healthy_drive;
@@ -194,16 +196,11 @@ void settle(PreparedGap& prepared, const NoiseFloor& sensors, const BlockOptions
     predict_efforts(drive, prepared.theta);
     ShapeGrids shapes(prepared.catalogue.size());
     std::vector<FittedEffect*> fitted(prepared.catalogue.size(), nullptr);
-    for (FittedEffect& effect : prepared.healthy) {
-      const auto e = static_cast<std::size_t>(std::ranges::find_if(prepared.catalogue,
-                                                                   [&](const Effect& each) {
-                                                                     return each.name == effect.effect.name &&
-                                                                            each.sentence == effect.effect.sentence;
-                                                                   }) -
-                                              prepared.catalogue.begin());
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      FittedEffect& effect = prepared.healthy[k];
       if (effect.coefficients.size() > 0) {
-        shapes[e] = {effect.shape};
-        fitted[e] = &effect;
+        shapes[found[k]] = {effect.shape};
+        fitted[found[k]] = &effect;
       }
     }
     BaselineFit next{make_problem(drive, sensors, prepared.healthy, std::vector<bool>(drive.model.p(), false),
@@ -290,8 +287,12 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   const BlockFit fit = gram.fit(subset);
   prepared.theta += fit.coefficients.head(prepared.theta.size());
   prepared.healthy = fitted_effects(problem.table, found.structural, fit, prepared.catalogue);
+  std::vector<std::size_t> places;
+  for (const std::size_t c : found.structural.members) {
+    places.push_back(problem.table.candidates[c].effect);
+  }
   BaselineFit last{std::move(problem), subset, fit};
-  settle(prepared, sensors, blocks, last);
+  settle(prepared, places, sensors, blocks, last);
   std::vector<Eigen::VectorXd> left = residuals(last.problem.rows, last.subset, last.fit.coefficients);
   const FittedEffect timing = timing_of(drive, last.problem.rows, left, prepared.row_options);
   // Held out, as the errors of other logs are that are measured by it.

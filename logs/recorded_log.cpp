@@ -214,6 +214,14 @@ std::string column_of_path(std::string_view text) {
 
 std::span<const LogColumn> log_columns() { return all().columns; }
 
+std::vector<std::string> log_column_names() {
+  std::vector<std::string> names;
+  for (const LogColumn& column : log_columns()) {
+    names.push_back(column.name);
+  }
+  return names;
+}
+
 const LogColumn* find_log_column(std::string_view name) {
   const auto columns = log_columns();
   const auto it = std::find_if(columns.begin(), columns.end(), [&](const LogColumn& c) { return c.name == name; });

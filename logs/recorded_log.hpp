@@ -27,6 +27,8 @@ struct LogColumn {
 
 /// All columns of the contract, time first.
 [[nodiscard]] std::span<const LogColumn> log_columns();
+/// Their names.
+[[nodiscard]] std::vector<std::string> log_column_names();
 
 /// The column of the contract called exactly `name`; nullptr where there is none.
 [[nodiscard]] const LogColumn* find_log_column(std::string_view name);

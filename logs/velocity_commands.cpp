@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/logs/velocity_commands.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include <wheelwright/core/check.hpp>
 #include <wheelwright/logs/bag_write.hpp>
 #include <wheelwright/logs/ros_messages.hpp>
 
@@ -13,13 +11,8 @@ namespace wheelwright::logs {
 
 void write_velocity_commands(const std::filesystem::path& path, const LogTable& commands) {
   constexpr double ns_per_s = 1e9;
-  const auto column = [&](const char* name) -> const std::vector<double>& {
-    const auto found = std::ranges::find(commands.names, name);
-    check::that(found != commands.names.end(), "write_velocity_commands", "the columns linear_x and angular_z");
-    return commands.columns[static_cast<std::size_t>(found - commands.names.begin())];
-  };
-  const std::vector<double>& linear = column("linear_x");
-  const std::vector<double>& angular = column("angular_z");
+  const std::vector<double>& linear = commands.column("linear_x");
+  const std::vector<double>& angular = commands.column("angular_z");
   BagWriter bag(path);
   const auto add = [&](const char* topic, const char* type) {
     return bag.add_topic(topic, type, ros_definition_text(*bundled_ros_definition(type)));

@@ -182,14 +182,7 @@ using Paths = std::variant<Path, std::vector<Path>>;
 }  // namespace
 
 robots::ColumnMap columns_of(const RobotObject& robot) {
-  if (robot.path.empty()) {
-    return {};
-  }
-  std::vector<std::string> names;
-  for (const logs::LogColumn& each : logs::log_columns()) {
-    names.push_back(each.name);
-  }
-  return robots::read_columns(robot.path, names);
+  return robot.path.empty() ? robots::ColumnMap{} : robots::read_columns(robot.path, logs::log_column_names());
 }
 
 logs::LogOptions reader_options(const RobotObject* robot, const std::map<std::string, std::string>& map,

@@ -238,32 +238,22 @@ std::unique_ptr<DesignObject> design(const std::variant<const ModelObject*, cons
       }
     };
     if (aim == "detection") {
-      // As the command line: an evaluation walks the plan once for each fault.
-      options.samples = 150;
-      options.descents = 3;
-      options.steps = 250;
       const OnlineModel& model = *std::get<0>(of)->model;
-      const design::DetectionDesign made =
-          design::design_for_detection(model, subject, limits, inspected(faults, model), options);
+      const design::DetectionDesign made = design::design_for_detection(
+          model, subject, limits, inspected(faults, model), design::sized_for(design::PlanCost::walk_each, options));
       out->json = results::to_json(made, limits);
       out->summary = words::summary(made);
       finish(made);
     } else if (rivals) {
-      options.samples = 150;
-      options.descents = 3;
-      options.steps = 250;
       const design::MotionLimits in_torques = gap::limits_in_torques(limits, subject);
-      const gap::DiscriminationDesign made = tell_apart(*rivals, gap::in_torques(subject), in_torques, options);
+      const gap::DiscriminationDesign made = tell_apart(*rivals, gap::in_torques(subject), in_torques,
+                                                        design::sized_for(design::PlanCost::walk_each, options));
       out->json = results::to_json(made, in_torques);
       out->summary = words::summary(made);
       finish(made);
     } else {
-      if (options.guarantee == design::Promise::at_risk) {  // as the command line
-        options.samples = 120;
-        options.descents = 2;
-        options.steps = 150;
-      }
-      const design::BoundsDesign made = design::design_for_bounds(subject, limits, wanted, options);
+      const design::BoundsDesign made = design::design_for_bounds(
+          subject, limits, wanted, design::sized_for(design::cost_of_bounds(options.guarantee), options));
       out->json = results::to_json(made, subject, limits);
       out->summary = words::summary(made, subject);
       finish(made);

@@ -52,14 +52,6 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
 
 namespace {
 
-std::vector<std::string> names_of_columns() {
-  std::vector<std::string> names;
-  for (const logs::LogColumn& column : logs::log_columns()) {
-    names.push_back(column.name);
-  }
-  return names;
-}
-
 study::FleetLog log_of(const robots::FleetListRobot& robot, const std::vector<robots::FleetListLog>& logs,
                        const FleetReading& reading) {
   study::FleetLog out;
@@ -78,7 +70,7 @@ study::FleetLog log_of(const robots::FleetListRobot& robot, const std::vector<ro
     }
     const Robot declared = file.empty() ? *reading.robot : read_robot(file);
     logs::LogOptions options = reading.reader;
-    options.map = file.empty() ? reading.columns : robots::read_columns(file, names_of_columns());
+    options.map = file.empty() ? reading.columns : robots::read_columns(file, logs::log_column_names());
     for (const auto& [name, column] : reading.reader.map) {
       options.map[name] = column;
     }
