@@ -88,7 +88,7 @@ int run(const Arguments& a) {
       CommonOptions files = a.common;
       files.json = false;
       report::ReportContext context = report_context(a.common, log.report(), log);
-      context.seen = commission::first_look(log, choice.chosen->model);
+      context.seen = commission::first_look(log, choice.chosen->model, options.trial.threads);
       publish(files, results::to_json(*choice.chosen, log.report(), results::software()), "model.json",
               report::choice_report(choice, context));
     }

@@ -10,6 +10,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
+#include <wheelwright/core/for_all.hpp>
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/page.hpp>
@@ -64,13 +65,19 @@ int run(const Arguments& a) {
   options.noise_mode = a.statistical ? filter::NoiseMode::statistical : filter::NoiseMode::worst_case;
   options.outliers = a.outliers;
   options.persistence = a.persistence.value_or(detector::Persistence{});
+  options.threads = static_cast<std::size_t>(a.common.threads);
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
   const Commissioning result = or_failure_page(a.common, context, [&] {
     logs::require_columns(log, robots::needed_columns(robot));
     Commissioning found = commission_robot(log, robot, options);
     if (!found.model.facets.empty() && !a.common.out.empty()) {
-      context.own_log = detect(log, make_detector(found.model), {.most_points = report::most_chart_points});
-      context.seen = commission::first_look(log, found.model);
+      const std::unique_ptr<LogSource> other = log.another_walk();
+      core::both(
+          other ? options.threads : 1,
+          [&] {
+            context.own_log = detect(log, make_detector(found.model), {.most_points = report::most_chart_points});
+          },
+          [&] { context.seen = commission::first_look(other ? *other : log, found.model); });
     }
     return found;
   });

@@ -47,7 +47,8 @@ int run(const Arguments& a) {
   const std::optional<Robot> robot = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
   const auto opened = logs::open_log(a.logs, robot ? robot_reader(*robot, a.common) : reader_options(a.common));
   logs::RecordedLog& log = *opened;
-  const doctor::LogHealth health = results::examine_first(log, robot, a.most_rows);
+  const doctor::LogHealth health =
+      results::examine_first(log, robot, a.most_rows, static_cast<std::size_t>(a.common.threads));
   if (!a.common.out.empty() || a.common.json) {
     results::HealthFiles files{a.robot.string(), {}, results::software()};
     for (const std::filesystem::path& path : a.logs) {

@@ -5,7 +5,8 @@ namespace wheelwright::app {
 
 SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
                         const CommonOptions& options, WheelPose pose) {
-  return results::open_sound_log(paths, robot, reader_options(options), options.despite, pose);
+  return results::open_sound_log(paths, robot, reader_options(options), options.despite, pose,
+                                 static_cast<std::size_t>(options.threads));
 }
 
 }  // namespace wheelwright::app

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <tuple>
 #include <utility>
 
@@ -14,6 +15,7 @@
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/commission/serial_correlation.hpp>
 #include <wheelwright/commission/sum_spread.hpp>
+#include <wheelwright/core/for_all.hpp>
 
 namespace wheelwright::commission {
 namespace {
@@ -49,19 +51,25 @@ void look_at_sums(LogSource& log, const OnlineModel& model, double risk, double 
   std::tie(attempt.spread, attempt.widest) = spread.largest();
 }
 
-Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::ErrorClasses& classes,
+RiskSet set_with(LogSource& log, const Commissioning& result, const filter::ErrorClasses& classes,
+                 const AtRiskOptions& options) {
+  return risk_set(log, result.model.model, result.model.measurement, result.row_errors, classes,
+                  *result.feasible.polytope, options.set);
+}
+
+Attempt attempt_with(LogSource& log, const Commissioning& result, const filter::ErrorClasses& classes, RiskSet set,
                      const AtRiskOptions& options) {
   Attempt attempt;
-  OnlineModel model = result.model;
-  attempt.set =
-      risk_set(log, model.model, model.measurement, result.row_errors, classes, *result.feasible.polytope, options.set);
+  attempt.set = std::move(set);
   if (!attempt.set.set) {
     return attempt;
   }
-  const bounds::Polytope& set = *attempt.set.set;
-  detector::RiskModel risk{.risk = options.set.risk, .errors = classes, .facets = set.facets(), .box = set.hull()};
+  const bounds::Polytope& polytope = *attempt.set.set;
+  detector::RiskModel risk{
+      .risk = options.set.risk, .errors = classes, .facets = polytope.facets(), .box = polytope.hull()};
   risk.scales = options.scales;
   risk.delay = options.set.delays[std::min<std::size_t>(1, options.set.delays.size() - 1)];
+  OnlineModel model = result.model;
   model.at_risk = std::move(risk);
   model.at_risk->usual = detector::usual_variances(log, model);
   look_at_sums(log, model, options.test_risk / 3.0, result.survey.seconds, attempt);
@@ -92,7 +100,7 @@ Estimate least_bias(LogSource& log, const Commissioning& result, const AtRiskOpt
   while (enough - none > 1) {
     const int step = (none + enough) / 2;
     classes->effort.bias = classes->effort.deviation * std::exp2(0.5 * (step - kSteps));
-    Attempt attempt = attempt_with(log, result, *classes, options);
+    Attempt attempt = attempt_with(log, result, *classes, set_with(log, result, *classes, options), options);
     if (attempt.model && attempt.utilisation <= kHalf && attempt.spread <= 1.0) {
       enough = step;
       best.attempt = std::move(attempt);
@@ -130,7 +138,15 @@ core::Assumption assumption_of(const filter::ErrorClasses& classes, const std::s
 
 }  // namespace
 
-void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options) {
+std::optional<RiskSet> declared_risk_set(LogSource& log, const Commissioning& result, const AtRiskOptions& options) {
+  if (!result.has_model() || !result.feasible.polytope || interval_warrant(result) != core::Warrant::guaranteed) {
+    return std::nullopt;
+  }
+  const auto classes = error_classes(result.model.robot, result.model.measurement);
+  return classes && classes->average() ? std::optional(set_with(log, result, *classes, options)) : std::nullopt;
+}
+
+void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options, std::optional<RiskSet> set) {
   OnlineModel& model = result.model;
   if (!result.has_model() || !result.feasible.polytope) {
     return;
@@ -144,7 +160,23 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
     }
     assumption = assumption_of(*classes, unit);
     assumption.test += ", and it is not like what it left before";
-    Attempt attempt = attempt_with(log, result, *classes, options);
+    RiskSet asked = set ? std::move(*set) : set_with(log, result, *classes, options);
+    SerialCorrelation serial;
+    Attempt attempt;
+    const auto look_back = [&](LogSource& walk) {
+      serial = serial_correlation(walk, {model.model, model.measurement, result.row_errors}, *classes, *asked.set,
+                                  result.survey.seconds, options.test_risk / 3.0);
+    };
+    const std::unique_ptr<LogSource> other = options.threads > 1 && asked.set ? log.another_walk() : nullptr;
+    core::both(
+        other ? options.threads : 1, [&] { attempt = attempt_with(log, result, *classes, asked, options); },
+        [&] {
+          if (other) {
+            look_back(*other);
+          } else if (attempt.model && attempt.utilisation <= 1.0 && attempt.spread <= 1.0) {
+            look_back(log);
+          }
+        });
     const auto contradicted = [&](std::string detail) {
       assumption.verdict = core::AssumptionVerdict::fails;
       assumption.detail = std::move(detail);
@@ -168,10 +200,7 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
     } else if (attempt.spread > 1.0) {
       contradicted(fmt::format("over {:g} s what the model leaves spreads wider, time and again, than such errors can",
                                attempt.model->scales[attempt.widest]));
-    } else if (const SerialCorrelation serial =
-                   serial_correlation(log, {model.model, model.measurement, result.row_errors}, *classes,
-                                      *attempt.set.set, result.survey.seconds, options.test_risk / 3.0);
-               serial.excess > 1.0) {
+    } else if (serial.excess > 1.0) {
       contradicted(fmt::format(
           "what the model leaves{} is like what it left {:.2g} s before, {:.2g} times as much as such errors can be",
           model.model.joints.size() > 1 ? " of " + model.model.joints[serial.joint].torque : std::string(),
@@ -199,7 +228,7 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
     }
   }
   if (model.at_risk && options.reach) {
-    result.reach = risk_reach(log, model);
+    result.reach = risk_reach(log, model, {.threads = options.threads});
   }
   result.assumptions.push_back(assumption);
   model.assumptions = result.assumptions;

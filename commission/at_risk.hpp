@@ -22,7 +22,8 @@ struct AtRiskOptions {
   /// Probability that a log which keeps to its assumptions is said to contradict them: by one sum, by the mean square
   /// of many, or by what is left being like what was left before, a third each.
   double test_risk = 3e-3;
-  bool reach = true;  ///< whether Commissioning::reach is asked for: a large part of the time
+  bool reach = true;        ///< whether Commissioning::reach is asked for: a large part of the time
+  std::size_t threads = 1;  ///< for a log that can be walked twice at once; the result does not depend on it
 };
 
 /// Adds Commissioning::at_risk and OnlineModel::at_risk to a guaranteed result whose robot file declares errors that
@@ -37,7 +38,14 @@ struct AtRiskOptions {
 /// stay as they were. Nothing is said where even a bias as large as the deviation is not enough. What is left may be
 /// like what was left before: an estimate takes what the log has of that into deviation and bias.
 ///
-/// Walks the log eight times; to estimate, about forty times.
-void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options = {});
+/// Walks the log eight times; to estimate, about forty times. `set`: declared_risk_set() of the same, where that was
+/// made before.
+void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& options = {},
+                   std::optional<RiskSet> set = {});
+
+/// The set that learn_at_risk() will ask for, which what is said of the pose has no part in; nothing where it will ask
+/// for none, or for one with estimated classes. Reads model, noise and feasible set of `result` alone.
+[[nodiscard]] std::optional<RiskSet> declared_risk_set(LogSource& log, const Commissioning& result,
+                                                       const AtRiskOptions& options = {});
 
 }  // namespace wheelwright::commission

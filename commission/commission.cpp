@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <limits>
 #include <memory>
 
@@ -282,6 +283,85 @@ KinematicCommissioning kinematics(LogSource& log, const Setting& s, const Commis
                                kinematic);
 }
 
+// A trial on held-out blocks of a model made from the other ones.
+struct HeldOut {
+  std::vector<OutputValidation> validation;  // empty where the other blocks leave no model
+  double polytope_over_box = 1.0;
+};
+
+HeldOut try_held_out(LogSource& log, const Setting& s, const CommissionOptions& options) {
+  HeldOut held_out;
+  const Fit trained = fit_log(log, s, Part::training, options.extrapolation.risk);
+  std::vector<std::string> unused;
+  std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
+  const Bounded learnt =
+      bounded_set(log, s, Part::training, trained, options.extrapolation.risk, noise, options.outliers, unused);
+  const FeasibleSet& set = learnt.result.set;
+  if (set.status != FeasibleSet::Status::nonempty) {
+    return held_out;
+  }
+  SignalErrors errors = with_noise(s, noise, RowUse::driving);
+  errors.motion = learnt.driving;
+  TorqueRows unseen = make_rows(log, s, errors);
+  FoldedSource rows(unseen, Part::held_out, s.survey.rows, s.folds);
+  held_out.validation = validate_on(
+      rows, detector::ThresholdRule(*set.polytope, best_guess(trained.estimate, trained.excitation, *set.polytope)));
+  held_out.polytope_over_box = 0.0;
+  for (const OutputValidation& v : held_out.validation) {
+    const double ratio = v.median_width_box > 0.0 ? v.median_width / v.median_width_box : 1.0;
+    held_out.polytope_over_box = std::max(held_out.polytope_over_box, ratio);
+  }
+  return held_out;
+}
+
+// What the whole log says of the torque; where it could be walked twice at once, the trial, too.
+struct Learnt {
+  Fit fit;
+  SignalFindings signals;
+  Bounded bounded;
+  std::optional<HeldOut> held_out;
+  std::exception_ptr held_out_failed;
+};
+
+// Fills in noise, notes and the kinematic residual of `result`, too.
+Learnt learn_beside(LogSource& log, const Setting& s, const CommissionOptions& options, Commissioning& result) {
+  const std::unique_ptr<LogSource> other = options.threads > 1 ? log.another_walk() : nullptr;
+  Learnt learnt;
+  core::both(
+      other ? options.threads : 1,
+      [&] {
+        tell(options, "comparing pose and wheels", 0.15);
+        result.kinematic = kinematics(log, s, options);
+        if (!other) {
+          return;
+        }
+        tell(options, "validating on held-out blocks", 0.3);
+        try {
+          learnt.held_out = try_held_out(log, s, options);
+        } catch (...) {
+          learnt.held_out_failed = std::current_exception();  // asked for where a model came out
+        }
+        tell(options, "bounding", 0.5);
+      },
+      [&] {
+        LogSource& walk = other ? *other : log;
+        const auto tell_alone = [&](std::string_view stage, double share) {
+          if (!other) {
+            tell(options, stage, share);
+          }
+        };
+        tell_alone("identifying", 0.2);
+        learnt.fit = fit_log(walk, s, Part::everything, options.extrapolation.risk);
+        tell_alone("looking for contradictions", 0.35);
+        learnt.signals = contradictions_in_log(walk, s, learnt.fit);
+        tell_alone("bounding", 0.4);
+        result.noise = output_noise(s, learnt.fit, options.extrapolation);
+        learnt.bounded = bounded_set(walk, s, Part::everything, learnt.fit, options.extrapolation.risk, result.noise,
+                                     options.outliers, result.notes);
+      });
+  return learnt;
+}
+
 void describe_assumptions(const Setting& s, Commissioning& result) {
   auto& notes = result.notes;
   if (s.measurement.motion == MotionKind::mean_speed) {
@@ -482,31 +562,21 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   result.folds = s.folds;
   result.model = described_model(s, options.persistence);
 
-  tell(options, "comparing pose and wheels", 0.15);
-  result.kinematic = kinematics(log, s, options);
+  const Learnt learnt = learn_beside(log, s, options, result);
   result.model.kinematic = result.kinematic.model;
-
-  tell(options, "identifying", 0.2);
-  const Fit fit = fit_log(log, s, Part::everything, options.extrapolation.risk);
+  const Fit& fit = learnt.fit;
+  const Bounded& bounded = learnt.bounded;
   result.estimators = fit.choice;
   result.residuals = fit.residuals;
   result.rank = fit.squares.rank;
   result.condition = fit.squares.condition;
-
-  tell(options, "looking for contradictions", 0.35);
-  SignalFindings signals = contradictions_in_log(log, s, fit);
-  result.contradictions = std::move(signals.contradictions);
-  if (signals.timing) {
-    result.effort_shift = signals.timing->delay;
+  result.contradictions = learnt.signals.contradictions;
+  if (learnt.signals.timing) {
+    result.effort_shift = learnt.signals.timing->delay;
   }
-
-  tell(options, "bounding", 0.4);
-  result.noise = output_noise(s, fit, options.extrapolation);
-  Bounded bounded = bounded_set(log, s, Part::everything, fit, options.extrapolation.risk, result.noise,
-                                options.outliers, result.notes);
-  result.feasible = std::move(bounded.result.set);
-  result.dropped = std::move(bounded.result.dropped);
-  result.earlier = std::move(bounded.earlier);
+  result.feasible = bounded.result.set;
+  result.dropped = bounded.result.dropped;
+  result.earlier = bounded.earlier;
   result.prior = s.prior;
   result.left_out = left_out(s, fit);
   result.row_errors = with_noise(s, result.noise, RowUse::learning);
@@ -536,33 +606,21 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   }
   finish_model(result.model, s, result.noise, fit, result.feasible, bounded.driving);
 
-  tell(options, "validating on held-out blocks", 0.7);
-  const Fit trained = fit_log(log, s, Part::training, options.extrapolation.risk);
-  std::vector<std::string> unused;
-  std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
-  const Bounded learnt =
-      bounded_set(log, s, Part::training, trained, options.extrapolation.risk, noise, options.outliers, unused);
-  const FeasibleSet& set = learnt.result.set;
-  if (set.status == FeasibleSet::Status::nonempty) {
-    SignalErrors errors = with_noise(s, noise, RowUse::driving);
-    errors.motion = learnt.driving;
-    TorqueRows unseen = make_rows(log, s, errors);
-    FoldedSource held_out(unseen, Part::held_out, s.survey.rows, s.folds);
-    result.validation = validate_on(
-        held_out,
-        detector::ThresholdRule(*set.polytope, best_guess(trained.estimate, trained.excitation, *set.polytope)));
-    result.polytope_over_box = 0.0;
-    for (const OutputValidation& v : result.validation) {
-      const double ratio = v.median_width_box > 0.0 ? v.median_width / v.median_width_box : 1.0;
-      result.polytope_over_box = std::max(result.polytope_over_box, ratio);
-    }
+  if (learnt.held_out_failed) {
+    std::rethrow_exception(learnt.held_out_failed);
   }
+  if (!learnt.held_out) {
+    tell(options, "validating on held-out blocks", 0.7);
+  }
+  const HeldOut held_out = learnt.held_out ? *learnt.held_out : try_held_out(log, s, options);
+  result.validation = held_out.validation;
+  result.polytope_over_box = held_out.polytope_over_box;
   for (LogContradiction& found : contradictions_in_result(result, s, bounded.raised)) {
     result.contradictions.push_back(std::move(found));
   }
   weigh_efforts(log, s, result.row_errors, result.feasible.hull, result.contradictions);
   if (wants_weighing(result, s)) {
-    weigh_contradictions(result, s, fit, signals.timing,
+    weigh_contradictions(result, s, fit, learnt.signals.timing,
                          explained_by_errors(log, s, fit, result.row_errors, result.feasible.hull));
   }
   if (withdrawn(result)) {
@@ -580,8 +638,14 @@ Commissioning commission_robot(LogSource& log, const Robot& robot, const Commiss
   Commissioning result = commissioned(log, robot, options);
   settle_warrants(result);
   if (options.at_risk != CommissionOptions::AtRisk::nothing) {
-    learn_pose_at_risk(log, result);
-    learn_at_risk(log, result, {.reach = options.at_risk == CommissionOptions::AtRisk::reach});
+    const AtRiskOptions at_risk{.reach = options.at_risk == CommissionOptions::AtRisk::reach,
+                                .threads = options.threads};
+    const std::unique_ptr<LogSource> other = options.threads > 1 ? log.another_walk() : nullptr;
+    std::optional<RiskSet> set;
+    core::both(
+        other ? options.threads : 1, [&] { learn_pose_at_risk(log, result); },
+        [&] { set = declared_risk_set(other ? *other : log, result, at_risk); });
+    learn_at_risk(log, result, at_risk, std::move(set));
   }
   return result;
 }

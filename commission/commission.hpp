@@ -115,6 +115,7 @@ struct CommissionOptions {
   /// first and the last each take as long as all the rest where the noise is estimated.
   enum class AtRisk { nothing, detector, reach };
   AtRisk at_risk = AtRisk::reach;
+  std::size_t threads = 1;  ///< for a log that can be walked twice at once; the result does not depend on it
   std::function<void(std::string_view stage, double share)> progress;  ///< told of every stage; may be empty
 };
 

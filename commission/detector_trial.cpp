@@ -39,6 +39,7 @@ double stated_size(const StatedFault& stated, const FaultType& fault) {
 // The bounds' promise, as commission_robot() takes it.
 CommissionOptions promise(const TrialOptions& options, const LogTable& log, std::size_t outputs) {
   CommissionOptions commissioning = options.commission;
+  commissioning.threads = options.threads;
   commissioning.persistence = {};
   commissioning.noise_mode = filter::NoiseMode::worst_case;
   if (options.false_alarms > 0.0) {

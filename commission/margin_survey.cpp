@@ -287,12 +287,13 @@ std::vector<std::string> telling_faults(const OnlineModel& model) {
   return names;
 }
 
-std::optional<MarginSurvey> first_look(LogSource& log, const OnlineModel& model) {
+std::optional<MarginSurvey> first_look(LogSource& log, const OnlineModel& model, std::size_t threads) {
   constexpr double kMost = 600.0;      // s of the log
   constexpr std::size_t kOnsets = 30;  // a glance, not the survey
   MarginSurveyOptions options;
   options.faults = telling_faults(model);
   options.map_points = 0;
+  options.margins.threads = threads;
   options.margins.windows = {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0};
   options.margins.most_onsets = options.risk_onsets = kOnsets;
   std::vector<std::string> columns = model.measurement.columns();

@@ -83,7 +83,7 @@ struct MarginSurvey {
 
 /// survey_margins() of these faults, from at most 30 onsets in the log's beginning (beginning_of(), 600 s), within 0.1
 /// to 20 s, without maps: for the first screen of a page. Nothing where that has no stretch in which the filter has
-/// settled.
-[[nodiscard]] std::optional<MarginSurvey> first_look(LogSource& log, const OnlineModel& model);
+/// settled. The result does not depend on `threads`.
+[[nodiscard]] std::optional<MarginSurvey> first_look(LogSource& log, const OnlineModel& model, std::size_t threads = 1);
 
 }  // namespace wheelwright::commission

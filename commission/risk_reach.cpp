@@ -86,6 +86,7 @@ std::vector<RiskReach> risk_reach(LogSource& log, const OnlineModel& model, cons
   }
   detector::SumMarginOptions margins;
   margins.windows = options.within;
+  margins.threads = options.threads;
   std::vector<RiskReach> result;
   for (const detector::FaultMargins& each : detector::margins_at_risk(*drive, model, motion, faults, onsets, margins)) {
     if (each.side < 0.0) {

@@ -27,6 +27,7 @@ struct RiskReachOptions {
   std::vector<double> within{1.0, 5.0, 20.0};  ///< s
   double every = 2.0;                          ///< s, between the moments that are looked at
   double most = 600.0;                         ///< s of the log that are looked at
+  std::size_t threads = 1;                     ///< the result does not depend on it
 };
 
 /// Of what the weights are like: effort readings that are off by a constant, or by a share of the effort that is lost,

@@ -85,8 +85,13 @@ class Variances {
  public:
   explicit Variances(Eigen::Index size) : sum_(Eigen::MatrixXd::Zero(size, size)), wide_(Eigen::VectorXd::Zero(size)) {}
   void add(const Eigen::VectorXd& middle, const Eigen::VectorXd& spread, double proxy) {
-    sum_.noalias() += proxy * middle * middle.transpose();
-    wide_ += (proxy * static_cast<double>(spread.size())) * spread.cwiseAbs2();
+    const double wide = proxy * static_cast<double>(spread.size());
+    for (Eigen::Index j = 0; j < wide_.size(); ++j) {
+      for (Eigen::Index i = 0; i < wide_.size(); ++i) {
+        sum_(i, j) += proxy * middle[i] * middle[j];
+      }
+      wide_[j] += wide * (spread[j] * spread[j]);
+    }
   }
   [[nodiscard]] Eigen::MatrixXd total() const {
     Eigen::MatrixXd result = (1.0 + kSpread) * sum_;
@@ -115,13 +120,17 @@ class SelfNormalised {
   void learn(const filter::SampleClass& sample, const Eigen::VectorXd& middle, const Eigen::VectorXd& spread) {
     prior_.add(middle, spread, sample.multiplicity * sample.deviation * sample.deviation);
   }
-  void add(const filter::SampleClass& sample, const Eigen::VectorXd& middle, const Eigen::VectorXd& spread) {
+  // `proxy` of the sample for every λ.
+  void add(const filter::SampleClass& sample, double proxy, const Eigen::VectorXd& middle,
+           const Eigen::VectorXd& spread) {
     fix();
-    small_.add(middle, spread,
-               sample.deviation < sample.bound
-                   ? filter::variance_proxy(sample, reach_ * ((root_ * middle).norm() + gain_ * spread.norm()))
-                   : filter::variance_proxy(sample));
-    all_.add(middle, spread, filter::variance_proxy(sample));
+    double smaller = proxy;
+    if (sample.deviation < sample.bound) {
+      turned_.noalias() = root_ * middle;
+      smaller = filter::variance_proxy(sample, reach_ * (turned_.norm() + gain_ * spread.norm()), proxy);
+    }
+    small_.add(middle, spread, smaller);
+    all_.add(middle, spread, proxy);
   }
 
   // Whether errors have deviations below their bounds.
@@ -171,6 +180,7 @@ class SelfNormalised {
   bool fixed_ = false;
   Variances prior_, small_, all_;
   Eigen::MatrixXd V0_, root_;  // root V0 rootᵀ = I
+  Eigen::VectorXd turned_;
 };
 
 // What becomes of a block's elements: first V0 is learnt from those in which the logged torque stands above the
@@ -261,18 +271,23 @@ class Learner {
     std::vector<Phase> phases = phases_of(blocks);
     std::size_t stretch = 0;
     std::size_t b = 0;
+    const double effort_proxy = filter::variance_proxy(filter::sample_class(classes_.effort, classes_.shortest_step));
+    const double motion_proxy = filter::variance_proxy(filter::sample_class(classes_.motion, classes_.shortest_step));
+    Eigen::VectorXd middle, spread;
     const auto sink = [&](const SampleWeight& s) {
       const filter::SampleClass c = sample_class(classes_, s);
       straight[b] += (c.averages ? c.bias : c.bound) * (s.middle.cwiseAbs() + s.spread);
       if (!c.averages) {
         return;
       }
+      const double proxy = s.sensor == SampleWeight::Sensor::effort ? effort_proxy : motion_proxy;
       for (std::size_t k = 0; k < blocks.size(); ++k) {
-        const Eigen::VectorXd middle = s.middle(blocks[k]), spread = s.spread(blocks[k]);
+        middle = s.middle(blocks[k]);
+        spread = s.spread(blocks[k]);
         for (std::size_t i = 0; i < kExpected.size(); ++i) {
           SelfNormalised& of = variances[b][k * kExpected.size() + i];
           if (!phases[k].of_prior()) {
-            of.add(c, middle, spread);
+            of.add(c, proxy, middle, spread);
           } else if (s.sensor == SampleWeight::Sensor::effort) {  // weights of the motion's errors depend on the box
             of.learn(c, middle, spread);
           }

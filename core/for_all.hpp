@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Parallel loop over independent iterations, on several threads.
+/// Parallel loop over independent iterations, and two tasks side by side, on several threads.
 #pragma once
 
 #include <algorithm>
@@ -42,6 +42,31 @@ void for_all(std::size_t count, std::size_t threads, const Work& work,
       helpers.emplace_back([&run] { run(false); });
     }
     run(true);
+  }
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+}
+
+/// Calls first() on this thread and second() beside it on another one where `threads` > 1, else one after the other.
+/// What first() throws is thrown again when both have ended; what second() throws, where first() threw nothing.
+template <typename First, typename Second>
+void both(std::size_t threads, const First& first, const Second& second) {
+  if (threads < 2) {
+    first();
+    second();
+    return;
+  }
+  std::exception_ptr failure;
+  {
+    const std::jthread helper([&] {
+      try {
+        second();
+      } catch (...) {
+        failure = std::current_exception();
+      }
+    });
+    first();
   }
   if (failure) {
     std::rethrow_exception(failure);

@@ -122,6 +122,12 @@ bool TableSource::next(LogBlock& block) {
   return rows > 0;
 }
 
+std::unique_ptr<LogSource> TableSource::another_walk() const {
+  auto walk = std::make_unique<TableSource>(*this);
+  walk->position_ = 0;
+  return walk;
+}
+
 LogTable read_all(LogSource& source) {
   source.rewind();
   LogTable table;

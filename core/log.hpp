@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -39,6 +40,9 @@ class LogSource {
   virtual void rewind() = 0;
   /// Median time step over the log, s (0 when the log has fewer than two rows).
   [[nodiscard]] virtual double median_step() const = 0;
+  /// A walk over the same rows that begins at the first, for another thread; null where a log can only be walked once
+  /// at a time.
+  [[nodiscard]] virtual std::unique_ptr<LogSource> another_walk() const { return nullptr; }
 
   /// Index of column `name`, or nothing.
   [[nodiscard]] std::optional<std::size_t> find(std::string_view name) const;
@@ -97,6 +101,7 @@ class TableSource final : public LogSource {
   bool next(LogBlock& block) override;
   void rewind() override;
   [[nodiscard]] double median_step() const override;
+  [[nodiscard]] std::unique_ptr<LogSource> another_walk() const override;
 
  private:
   const LogTable* table_;

@@ -79,10 +79,10 @@ double cross(const std::array<double, 2>& a, const std::array<double, 2>& b) { r
 
 // An error whose factor in a sum is e^{−x} (α0 + α1 x).
 template <typename Factor>
-void add_variance(std::array<double, 3>& V, const filter::SampleClass& sample, double reach, double size0, double size1,
-                  const Factor& product) {
+void add_variance(std::array<double, 3>& V, const filter::SampleClass& sample, double proxy, double reach, double size0,
+                  double size1, const Factor& product) {
   if (sample.averages) {
-    const double s = filter::variance_proxy(sample, reach * (size0 + SumKernel::kLargest * size1));
+    const double s = filter::variance_proxy(sample, reach * (size0 + SumKernel::kLargest * size1), proxy);
     V[0] += s * size0 * size0;
     V[1] += 2.0 * s * product;
     V[2] += s * size1 * size1;
@@ -133,6 +133,8 @@ PoseSumDetector::PoseSumDetector(const KinematicModel& model, PoseSumOptions opt
   const double shortest = risk_.errors.shortest_step;
   position_ = class_of(risk_.errors.position, shortest, std::numbers::sqrt2);
   heading_ = class_of(risk_.errors.heading, shortest, 1.0);
+  position_proxy_ = filter::variance_proxy(position_);
+  heading_proxy_ = filter::variance_proxy(heading_);
   correlation_ = std::max(risk_.errors.position.correlation, risk_.errors.heading.correlation);
   largest_ = half_ = Eigen::VectorXd(p);
   for (Eigen::Index q = 0; q < p; ++q) {
@@ -357,12 +359,12 @@ void PoseSumDetector::take(const Step& step) {
       sum.l0 += telescoping.bias * size0;
       sum.l1 += telescoping.bias * size1;
       add_variance(of_position ? sum.position : sum.heading, telescoping,
-                   of_position ? sum.reach_position : sum.reach_heading, size0, size1, dot(a0, a1));
+                   of_position ? position_proxy_ : heading_proxy_, of_position ? sum.reach_position : sum.reach_heading, size0, size1, dot(a0, a1));
       if (of_position) {
         const double b0 = 0.5 * x * d * f.turned1, b1 = 0.5 * (d * f.turned1 + f.turned);
         sum.l0 += heading_.bias * std::abs(b0);
         sum.l1 += heading_.bias * std::abs(b1);
-        add_variance(sum.heading, heading_, sum.reach_heading, std::abs(b0), std::abs(b1), b0 * b1);
+        add_variance(sum.heading, heading_, heading_proxy_, sum.reach_heading, std::abs(b0), std::abs(b1), b0 * b1);
       }
       for (std::size_t k = 0; k < 2; ++k) {
         sum.l0 += n * std::abs(x * d * f.wheel1[k]);

@@ -4,7 +4,6 @@
 #include <map>
 #include <numbers>
 #include <optional>
-#include <set>
 
 #include <fmt/format.h>
 
@@ -61,11 +60,10 @@ double mean_rows(const std::vector<Run>& runs) {
 }
 
 std::size_t distinct(const std::vector<Run>& runs) {
-  std::set<double> values;
-  for (const Run& run : runs) {
-    values.insert(run.value);
-  }
-  return values.size();
+  std::vector<double> values(runs.size());
+  std::ranges::transform(runs, values.begin(), &Run::value);
+  std::ranges::sort(values);
+  return values.size() - std::ranges::unique(values).size();
 }
 
 LogFinding about(const char* id, FindingSeverity severity, const std::string& column, std::string sentence,
@@ -192,8 +190,8 @@ std::optional<double> repeats(const HealthView& view, const Column& c, const std
     return std::nullopt;
   }
   const double mean = mean_rows(runs);
-  const bool fine_values = static_cast<double>(distinct(runs)) > kFresh * static_cast<double>(runs.size());
-  return mean > 1.3 && fine_values ? std::optional(mean) : std::nullopt;
+  const bool stale = mean > 1.3 && static_cast<double>(distinct(runs)) > kFresh * static_cast<double>(runs.size());
+  return stale ? std::optional(mean) : std::nullopt;
 }
 
 // One finding for all columns of a kind; `rows` is how long a value lasts in each.

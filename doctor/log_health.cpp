@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/core/for_all.hpp>
 #include <wheelwright/core/statistics.hpp>
 #include <wheelwright/core/words.hpp>
 
@@ -398,7 +400,8 @@ LogTable first_rows(LogSource& log, std::size_t most) {
   return table;
 }
 
-LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const ReaderCounts& reader) {
+LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const ReaderCounts& reader,
+                  std::size_t threads) {
   const HealthView view = make_view(log, robot);
   LogHealth health;
   health.rows = log.rows();
@@ -410,11 +413,18 @@ LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const 
   health.assumed = assumption(view);
   check_columns(view, health.findings);
   check_time(view, reader, health.findings);
+  bool reaches_bounds = false;
   if (log.rows() > 0) {
-    check_signals(view, reader, health.findings);
-    check_odometry(view, health.findings);
+    std::vector<LogFinding> of_motion;
+    core::both(
+        threads,
+        [&] {
+          check_signals(view, reader, health.findings);
+          check_odometry(view, health.findings);
+        },
+        [&] { reaches_bounds = check_motion(view, of_motion); });
+    std::ranges::move(of_motion, std::back_inserter(health.findings));
   }
-  const bool reaches_bounds = log.rows() > 0 && check_motion(view, health.findings);
   conclude(view, reaches_bounds, health);
   return health;
 }

@@ -71,11 +71,15 @@ inline constexpr double kCountsThatAverage = 4.0;
 }
 
 /// The same for all |λ| <= `reach` (1/unit): the smaller of that and Bernstein's, deviation²/(1 − u/3) with u = reach ·
-/// (bound + bias) [boucheron2013], for small λ next to the variance.
-[[nodiscard]] inline double variance_proxy(const SampleClass& sample, double reach) {
-  const double m = sample.multiplicity, deviation = sample.deviation * sample.deviation, all = variance_proxy(sample);
+/// (bound + bias) [boucheron2013], for small λ next to the variance. `all`: variance_proxy(sample), which costs a
+/// logarithm.
+[[nodiscard]] inline double variance_proxy(const SampleClass& sample, double reach, double all) {
+  const double m = sample.multiplicity, deviation = sample.deviation * sample.deviation;
   const double u = m * reach * (sample.bound + sample.bias);
   return m * deviation < all * (1.0 - u / 3.0) ? m * deviation / (1.0 - u / 3.0) : all;
+}
+[[nodiscard]] inline double variance_proxy(const SampleClass& sample, double reach) {
+  return variance_proxy(sample, reach, variance_proxy(sample));
 }
 
 /// Adds a sample that stands in a sum with a weight of the size `weight` >= 0.

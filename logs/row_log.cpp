@@ -145,6 +145,38 @@ namespace {
 
 constexpr std::size_t steps_for_median = 100001;
 
+/// The rows of a log that are in memory.
+class KeptRows final : public LogSource {
+ public:
+  KeptRows(std::shared_ptr<const std::vector<LogBlock>> blocks, std::vector<std::string> names, double median_step)
+      : blocks_(std::move(blocks)), names_(std::move(names)), median_step_(median_step) {}
+
+  [[nodiscard]] const std::vector<std::string>& columns() const override { return names_; }
+  bool next(LogBlock& block) override {
+    if (position_ == blocks_->size()) {
+      block.t.clear();
+      block.segment_starts.clear();
+      for (std::vector<double>& column : block.columns) {
+        column.clear();
+      }
+      return false;
+    }
+    block = (*blocks_)[position_++];
+    return true;
+  }
+  void rewind() override { position_ = 0; }
+  [[nodiscard]] double median_step() const override { return median_step_; }
+  [[nodiscard]] std::unique_ptr<LogSource> another_walk() const override {
+    return std::make_unique<KeptRows>(blocks_, names_, median_step_);
+  }
+
+ private:
+  std::shared_ptr<const std::vector<LogBlock>> blocks_;
+  std::vector<std::string> names_;
+  double median_step_;
+  std::size_t position_ = 0;
+};
+
 }  // namespace
 
 double middle_of(std::vector<double>& steps) {
@@ -166,8 +198,10 @@ RowLog::RowLog(std::vector<std::unique_ptr<RowFile>> files, RowLogOptions option
     }
   }
   find_median_step();
+  kept_ = std::make_shared<std::vector<LogBlock>>();
   survey();
   judge();
+  kept_walk_ = another_walk();
 }
 
 std::unique_ptr<RowWalk> RowLog::open(std::size_t file, LogReport* report) {
@@ -205,7 +239,10 @@ void RowLog::survey() {
         file.seconds += last - start;
         start = walk->t();
       }
-      last = outcome == RowOutcome::dropped ? last : walk->t();
+      if (outcome != RowOutcome::dropped) {
+        last = walk->t();
+        keep(*walk, outcome == RowOutcome::new_segment);
+      }
     }
     file.path = files_[k]->path();
     walk->describe(file);
@@ -213,6 +250,30 @@ void RowLog::survey() {
     file.seconds += last - start;
     report_.segments += file.segments;
     report_.seconds += file.seconds;
+  }
+}
+
+void RowLog::keep(const RowWalk& walk, bool starts) {
+  if (!kept_) {
+    return;
+  }
+  const std::size_t limit = options_.block_rows, width = names_.size();
+  if (kept_->empty() || kept_->back().rows() == limit) {
+    const std::size_t rows = kept_->size() * limit;
+    if ((rows + limit) * (width + 1) > options_.kept_bytes / sizeof(double)) {
+      kept_.reset();
+      return;
+    }
+    kept_->emplace_back().first_row = rows;
+    kept_->back().columns.resize(width);
+  }
+  LogBlock& block = kept_->back();
+  if (starts) {
+    block.segment_starts.push_back(block.rows());
+  }
+  block.t.push_back(walk.t());
+  for (std::size_t c = 0; c < width; ++c) {
+    block.columns[c].push_back(walk.values()[c]);
   }
 }
 
@@ -235,13 +296,24 @@ double RowLog::longest_step() const {
   return report_.median_step > 0.0 ? gap_factor * report_.median_step : std::numeric_limits<double>::infinity();
 }
 
+std::unique_ptr<LogSource> RowLog::another_walk() const {
+  return kept_ ? std::make_unique<KeptRows>(kept_, names_, report_.median_step) : nullptr;
+}
+
 void RowLog::rewind() {
+  if (kept_walk_) {
+    kept_walk_->rewind();
+    return;
+  }
   file_ = 0;
   first_row_ = 0;
   walk_.reset();
 }
 
 bool RowLog::next(LogBlock& block) {
+  if (kept_walk_) {
+    return kept_walk_->next(block);
+  }
   const std::size_t limit = options_.block_rows;
   const std::size_t width = names_.size();
   block.first_row = first_row_;

@@ -122,9 +122,12 @@ class RowFile {
 struct RowLogOptions {
   std::size_t block_rows = 4096;  ///< rows of a block, at least 1
   std::size_t min_rows = 20;      ///< usable rows that a log must have
+  /// Rows are kept in memory where they need no more than this; those of a longer log are read anew by every walk.
+  std::size_t kept_bytes = std::size_t{1} << 29;
 };
 
-/// A log over files, each of which begins a new segment. Memory does not grow with them.
+/// A log over files, each of which begins a new segment. Memory does not grow with them beyond
+/// `RowLogOptions::kept_bytes`.
 class RowLog : public RecordedLog {
  public:
   /// Reads all of `files` once: the median step, the hashes, and everything that report() says. columns() are those
@@ -137,11 +140,14 @@ class RowLog : public RecordedLog {
   void rewind() override;
   [[nodiscard]] double median_step() const override { return report_.median_step; }
   [[nodiscard]] const LogReport& report() const override { return report_; }
+  /// Null for a log whose rows are not kept. Outlives this one.
+  [[nodiscard]] std::unique_ptr<LogSource> another_walk() const override;
 
  private:
   [[nodiscard]] std::unique_ptr<RowWalk> open(std::size_t file, LogReport* report);
   void find_median_step();
   void survey();
+  void keep(const RowWalk& walk, bool starts);
   void judge() const;
   [[nodiscard]] double longest_step() const;
 
@@ -152,6 +158,8 @@ class RowLog : public RecordedLog {
   std::size_t file_ = 0;
   std::unique_ptr<RowWalk> walk_;
   std::size_t first_row_ = 0;
+  std::shared_ptr<std::vector<LogBlock>> kept_;  ///< all rows, or null
+  std::unique_ptr<LogSource> kept_walk_;
 };
 
 /// Median of `steps` (reordered by it); 0 where there are none.

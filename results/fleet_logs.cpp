@@ -13,12 +13,12 @@
 namespace wheelwright::results {
 
 SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot, logs::LogOptions reader,
-                        const std::vector<std::string>& despite, WheelPose pose) {
+                        const std::vector<std::string>& despite, WheelPose pose, std::size_t threads) {
   reader.only = robots::useful_columns(robot);
   SoundLog out;
   out.log = logs::open_log(paths, reader);
   const doctor::LogHealth health =
-      doctor::examine(doctor::first_rows(*out.log, kExaminedRows), robot, reader_counts(out.log->report()));
+      doctor::examine(doctor::first_rows(*out.log, kExaminedRows), robot, reader_counts(out.log->report()), threads);
   std::string wrong;
   std::vector<std::string> names;
   for (const doctor::LogFinding& finding : health.findings) {

@@ -39,7 +39,8 @@ struct SoundLog {
 /// findings by their names. Other fatal findings (nothing excited, a dead signal, efforts late) are left to the callers,
 /// which have an answer of their own to each. A log that lacks columns is not examined. Throws as open_log().
 [[nodiscard]] SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
-                                      logs::LogOptions reader, const std::vector<std::string>& despite, WheelPose pose);
+                                      logs::LogOptions reader, const std::vector<std::string>& despite, WheelPose pose,
+                                      std::size_t threads = 1);
 
 /// How the logs of a fleet are read.
 struct FleetReading {

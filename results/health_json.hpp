@@ -29,7 +29,7 @@ struct HealthFiles {
 
 /// Examines the first `most` rows of `log` (doctor::examine); a finding says so where there are more.
 [[nodiscard]] doctor::LogHealth examine_first(logs::RecordedLog& log, const std::optional<Robot>& robot,
-                                              std::size_t most);
+                                              std::size_t most, std::size_t threads = 1);
 
 /// The examination as JSON (results/doctor.schema.json), findings in their order.
 [[nodiscard]] Json to_json(const doctor::LogHealth& health, const HealthFiles& files);
