@@ -274,13 +274,10 @@ void tell(const CommissionOptions& options, std::string_view stage, double share
 }
 
 KinematicCommissioning kinematics(LogSource& log, const Setting& s, const CommissionOptions& options) {
-  KinematicCommissionOptions kinematic = options.kinematic;
-  kinematic.folds = options.folds;
-  kinematic.extrapolation = options.extrapolation;
-  kinematic.persistence = options.persistence;
-  kinematic.window = s.robot.kinematic_window.value_or(kinematic.window);
-  return commission_kinematics(log, s.robot, filter::find_odometry(log, s.robot, s.model, s.measurement), s.survey,
-                               kinematic);
+  return options.kinematic_part
+             ? options.kinematic_part->residual
+             : commission_kinematics(log, s.robot, filter::find_odometry(log, s.robot, s.model, s.measurement),
+                                     s.survey, kinematic_options(s.robot, options));
 }
 
 // A trial on held-out blocks of a model made from the other ones.
@@ -634,6 +631,15 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 
 }  // namespace
 
+KinematicCommissionOptions kinematic_options(const Robot& robot, const CommissionOptions& options) {
+  KinematicCommissionOptions kinematic = options.kinematic;
+  kinematic.folds = options.folds;
+  kinematic.extrapolation = options.extrapolation;
+  kinematic.persistence = options.persistence;
+  kinematic.window = robot.kinematic_window.value_or(kinematic.window);
+  return kinematic;
+}
+
 Commissioning commission_robot(LogSource& log, const Robot& robot, const CommissionOptions& options) {
   Commissioning result = commissioned(log, robot, options);
   settle_warrants(result);
@@ -643,7 +649,10 @@ Commissioning commission_robot(LogSource& log, const Robot& robot, const Commiss
     const std::unique_ptr<LogSource> other = options.threads > 1 ? log.another_walk() : nullptr;
     std::optional<RiskSet> set;
     core::both(
-        other ? options.threads : 1, [&] { learn_pose_at_risk(log, result); },
+        other ? options.threads : 1,
+        [&] {
+          learn_pose_at_risk(log, result, {}, options.kinematic_part ? options.kinematic_part->at_risk : std::nullopt);
+        },
         [&] { set = declared_risk_set(other ? *other : log, result, at_risk); });
     learn_at_risk(log, result, at_risk, std::move(set));
   }

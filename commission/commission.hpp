@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -100,6 +101,8 @@ struct Commissioning {
   std::vector<core::Assumption> assumptions;  ///< all assumptions, with the verdict of the log on each
 };
 
+struct KinematicPart;
+
 /// Options of commission_robot().
 struct CommissionOptions {
   FilterChoiceOptions filter_choice;
@@ -116,8 +119,14 @@ struct CommissionOptions {
   enum class AtRisk { nothing, detector, reach };
   AtRisk at_risk = AtRisk::reach;
   std::size_t threads = 1;  ///< for a log that can be walked twice at once; the result does not depend on it
+  /// The kinematic residual as it was made before (make_kinematic_part()), of the same log, robot and options and for a
+  /// filter of the same order: taken instead of being made again.
+  std::shared_ptr<const KinematicPart> kinematic_part{};
   std::function<void(std::string_view stage, double share)> progress;  ///< told of every stage; may be empty
 };
+
+/// CommissionOptions::kinematic with what comes from the other options and from the robot.
+[[nodiscard]] KinematicCommissionOptions kinematic_options(const Robot& robot, const CommissionOptions& options);
 
 /// Log → filtered regression → θ̂_L → feasible set and bounds → ρ(t) → validation. Walks the log several times and
 /// never holds it. Throws InputError or InvalidArgument for a log or robot that cannot be used at all; outcomes that

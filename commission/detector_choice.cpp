@@ -2,8 +2,10 @@
 #include <wheelwright/commission/detector_choice.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -237,9 +239,12 @@ class Search {
     const FilterDesign filter = choice_.candidates.front().filter;
     const Guarantee guarantee = choice_.candidates.front().guarantee;
     TrialOptions trial = options_.trial;
-    trial.commission.at_risk = at_risk_;
     trial.false_alarms = guarantee == Guarantee::never ? 0.0 : trial.false_alarms;
-    choice_.chosen = try_detector(log_, *robot_, filter, {{}}, "", trial).commissioning;
+    choice_.chosen = commissioned(filter, trial);
+    if (at_risk_ == CommissionOptions::AtRisk::reach && choice_.chosen && choice_.chosen->model.at_risk) {
+      TableSource source(log_);
+      choice_.chosen->reach = risk_reach(source, choice_.chosen->model, {.threads = trial.threads});
+    }
     choice_.notes.push_back(assumption(guarantee, trial.false_alarms));
     tell("done", 1.0);
     return std::move(choice_);
@@ -256,14 +261,19 @@ class Search {
     const std::vector<Wish> all = wishes(log_, *robot_, options_, choice_.notes);
     check::that(!all.empty(), "log", "columns for a filter of order 1 or 2");
     choice_.candidates.resize(all.size());
+    tried_.resize(all.size());
     options_.trial.tried = all.size() + options_.most_refinements;
     TrialOptions trial = options_.trial;
     trial.threads = 1;
+    core::for_all(parts_.size(), options_.trial.threads,
+                  [&](std::size_t k) { parts_[k] = kinematic_part_of(log_, *robot_, static_cast<int>(k) + 1, trial); });
     core::for_all(
         all.size(), options_.trial.threads,
         [&](std::size_t i) {
-          choice_.candidates[i] =
-              try_detector(log_, *robot_, all[i].filter, {{}}, all[i].origin, trial).candidates.front();
+          const FilterDesign& filter = all[i].filter;
+          Trial tried = try_detector(log_, *robot_, filter, {{}}, all[i].origin, with_part(trial, filter));
+          choice_.candidates[i] = tried.candidates.front();
+          tried_[i] = {filter, trial.false_alarms, std::move(tried.commissioning)};
         },
         [&](std::size_t begun) {
           tell("trying filters", 0.7 * static_cast<double>(begun) / static_cast<double>(all.size()));
@@ -334,7 +344,7 @@ class Search {
       return kInfinity;
     }
     double least = kInfinity;
-    for (DetectorCandidate& candidate : try_detector(log_, *robot_, filter, persistences, origin, trial).candidates) {
+    for (DetectorCandidate& candidate : try_out(filter, persistences, origin, trial)) {
       rate(candidate, choice_.hopeless, options_.either);
       least = std::min(least, candidate.size);
       choice_.candidates.push_back(std::move(candidate));
@@ -342,11 +352,54 @@ class Search {
     return least;
   }
 
+  // A commissioning that was made on the way.
+  struct Tried {
+    FilterDesign filter;
+    double false_alarms = 0.0;
+    std::optional<Commissioning> commissioning;
+  };
+
+  [[nodiscard]] const Tried* find_tried(const FilterDesign& filter, double false_alarms) const {
+    const auto at = std::ranges::find_if(tried_, [&](const Tried& tried) {
+      return tried.filter.order == filter.order && tried.filter.alpha == filter.alpha &&
+             tried.filter.beta == filter.beta && tried.false_alarms == false_alarms;
+    });
+    return at == tried_.end() ? nullptr : &*at;
+  }
+
+  // The kinematic parts are those of options_.trial.
+  [[nodiscard]] TrialOptions with_part(TrialOptions trial, const FilterDesign& filter) const {
+    if (trial.false_alarms == options_.trial.false_alarms) {
+      trial.commission.kinematic_part = parts_.at(static_cast<std::size_t>(filter.order - 1));
+    }
+    return trial;
+  }
+
+  [[nodiscard]] std::vector<DetectorCandidate> try_out(const FilterDesign& filter,
+                                                       const std::vector<detector::Persistence>& persistences,
+                                                       const std::string& origin, const TrialOptions& trial) {
+    const Tried* known = find_tried(filter, trial.false_alarms);
+    if (known != nullptr && known->commissioning) {
+      return candidates_of(log_, *known->commissioning, filter, persistences, origin, trial);
+    }
+    Trial tried = try_detector(log_, *robot_, filter, persistences, origin, with_part(trial, filter));
+    tried_.push_back({filter, trial.false_alarms, std::move(tried.commissioning)});
+    return tried.candidates;
+  }
+
+  [[nodiscard]] std::optional<Commissioning> commissioned(const FilterDesign& filter, const TrialOptions& trial) {
+    const Tried* known = find_tried(filter, trial.false_alarms);
+    return known != nullptr ? known->commissioning
+                            : try_detector(log_, *robot_, filter, {{}}, "", with_part(trial, filter)).commissioning;
+  }
+
   LogTable log_;
   const Robot* robot_;
   CommissionOptions::AtRisk at_risk_;  // of the chosen one
   DetectorChoiceOptions options_;
   DetectorChoice choice_;
+  std::array<std::shared_ptr<const KinematicPart>, 2> parts_;  // of filters of order 1 and 2
+  std::vector<Tried> tried_;
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/commission/pose_at_risk.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/core/limits.hpp>
@@ -248,6 +249,45 @@ void validate(const TrialOptions& options, const Robot& robot) {
   }
 }
 
+namespace {
+
+// Until commissioning has said more.
+DetectorCandidate candidate_with(const FilterDesign& filter, const std::string& origin, const TrialOptions& options) {
+  DetectorCandidate candidate{.filter = filter, .persistence = {}, .origin = origin};
+  candidate.guarantee = options.false_alarms > 0.0 ? Guarantee::hourly : Guarantee::never;
+  return candidate;
+}
+
+}  // namespace
+
+std::vector<DetectorCandidate> candidates_of(const LogTable& log, const Commissioning& commissioning,
+                                             const FilterDesign& filter,
+                                             const std::vector<detector::Persistence>& persistences,
+                                             const std::string& origin, const TrialOptions& options) {
+  DetectorCandidate candidate = candidate_with(filter, origin, options);
+  try {
+    candidate.guarantee = guarantee_of(commissioning);
+    candidate.failure = commissioning.model.facets.empty() ? commissioning.message : std::string();
+    if (candidate.failure.empty()) {
+      std::vector<DetectorCandidate> candidates;
+      const Margins margins(log, commissioning.model, options);
+      for (const detector::Persistence& persistence : persistences) {
+        candidates.push_back(candidate);
+        candidates.back().persistence = persistence;
+        candidates.back().faults = margins(persistence);
+        candidates.back().miss = margins.miss();
+        if (const auto& at_risk = commissioning.model.at_risk) {
+          candidates.back().risk_warrant = at_risk->warrant;
+        }
+      }
+      return candidates;
+    }
+  } catch (const Error& error) {
+    candidate.failure = error.what();
+  }
+  return {candidate};
+}
+
 Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& filter,
                    const std::vector<detector::Persistence>& persistences, const std::string& origin,
                    const TrialOptions& options) {
@@ -255,31 +295,30 @@ Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& 
   Robot wished = robot;
   wished.filter = {.order = filter.order, .alpha = filter.alpha, .beta = filter.beta};
   Trial trial;
-  DetectorCandidate candidate{.filter = filter, .persistence = {}, .origin = origin};
-  candidate.guarantee = options.false_alarms > 0.0 ? Guarantee::hourly : Guarantee::never;
   try {
     TableSource source(log);
     trial.commissioning = commission_robot(source, wished, promise(options, log, model::make_model(robot).n()));
-    candidate.guarantee = guarantee_of(*trial.commissioning);
-    candidate.failure = trial.commissioning->model.facets.empty() ? trial.commissioning->message : std::string();
-    if (candidate.failure.empty()) {
-      const Margins margins(log, trial.commissioning->model, options);
-      for (const detector::Persistence& persistence : persistences) {
-        trial.candidates.push_back(candidate);
-        trial.candidates.back().persistence = persistence;
-        trial.candidates.back().faults = margins(persistence);
-        trial.candidates.back().miss = margins.miss();
-        if (const auto& at_risk = trial.commissioning->model.at_risk) {
-          trial.candidates.back().risk_warrant = at_risk->warrant;
-        }
-      }
-      return trial;
-    }
   } catch (const Error& error) {
-    candidate.failure = error.what();
+    trial.candidates.push_back(candidate_with(filter, origin, options));
+    trial.candidates.back().failure = error.what();
+    return trial;
   }
-  trial.candidates.assign(1, candidate);
+  trial.candidates = candidates_of(log, *trial.commissioning, filter, persistences, origin, options);
   return trial;
+}
+
+std::shared_ptr<const KinematicPart> kinematic_part_of(const LogTable& log, const Robot& robot, int order,
+                                                       const TrialOptions& options) {
+  validate(options, robot);
+  Robot wished = robot;
+  wished.filter.order = order;
+  try {
+    TableSource source(log);
+    return std::make_shared<const KinematicPart>(
+        make_kinematic_part(source, wished, promise(options, log, model::make_model(robot).n())));
+  } catch (const Error&) {
+    return nullptr;
+  }
 }
 
 }  // namespace wheelwright::commission

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -104,6 +105,17 @@ struct Trial {
 [[nodiscard]] Trial try_detector(const LogTable& log, const Robot& robot, const FilterDesign& filter,
                                  const std::vector<detector::Persistence>& persistences, const std::string& origin,
                                  const TrialOptions& options);
+
+/// The candidates of a commissioning that try_detector() made with the same options, under other `persistences`.
+[[nodiscard]] std::vector<DetectorCandidate> candidates_of(const LogTable& log, const Commissioning& commissioning,
+                                                           const FilterDesign& filter,
+                                                           const std::vector<detector::Persistence>& persistences,
+                                                           const std::string& origin, const TrialOptions& options);
+
+/// The kinematic residual for TrialOptions::commission of trials with filters of `order`: none of them changes it. Null
+/// where it cannot be made; the trials then say why. Throws as validate().
+[[nodiscard]] std::shared_ptr<const KinematicPart> kinematic_part_of(const LogTable& log, const Robot& robot, int order,
+                                                                     const TrialOptions& options);
 
 /// Throws InvalidArgument unless lengths are positive, the probability is in [0, 1), and every fault is one of the
 /// catalogue's, stated once, with a size inside its range (of a mass: when it is found).

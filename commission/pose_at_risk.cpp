@@ -12,6 +12,7 @@
 #include <wheelwright/commission/sum_spread.hpp>
 #include <wheelwright/core/regression.hpp>
 #include <wheelwright/core/statistics.hpp>
+#include <wheelwright/filter/measurement.hpp>
 
 namespace wheelwright::commission {
 namespace {
@@ -256,14 +257,44 @@ PoseAtRisk pose_at_risk(LogSource& log, const detector::KinematicModel& guarante
   return result;
 }
 
-void learn_pose_at_risk(LogSource& log, Commissioning& result, const PoseAtRiskOptions& options) {
+namespace {
+
+// What is asked of the pose's errors; nothing where nothing can be said at a risk.
+std::optional<detector::PoseErrors> errors_that_average(LogSource& log, const Robot& robot,
+                                                        const std::optional<detector::KinematicModel>& model) {
+  if (!model || !model->measurement.heading) {
+    return std::nullopt;
+  }
+  const auto errors = pose_errors(robot, pose_steps(log, model->measurement).shortest);
+  return errors && errors->average() ? errors : std::nullopt;
+}
+
+}  // namespace
+
+KinematicPart make_kinematic_part(LogSource& log, const Robot& robot, const CommissionOptions& options) {
+  const Model model = model::make_model(robot);
+  const Measurement measurement = filter::find_measurement(log, robot, model, robot.filter.order.value_or(2));
+  const Survey seen = survey(log, measurement);
+  KinematicPart part{commission_kinematics(log, robot, filter::find_odometry(log, robot, model, measurement), seen,
+                                           kinematic_options(robot, options)),
+                     {}};
+  if (options.at_risk != CommissionOptions::AtRisk::nothing) {
+    if (const auto errors = errors_that_average(log, robot, part.residual.model)) {
+      part.at_risk = pose_at_risk(log, *part.residual.model, *errors, seen.seconds);
+    }
+  }
+  return part;
+}
+
+void learn_pose_at_risk(LogSource& log, Commissioning& result, const PoseAtRiskOptions& options,
+                        const std::optional<PoseAtRisk>& made) {
   KinematicCommissioning& kinematic = result.kinematic;
-  if (!result.has_model() || !kinematic.model || !kinematic.model->measurement.heading) {
+  if (!result.has_model()) {
     return;
   }
   const Robot& robot = result.model.robot;
-  const auto errors = pose_errors(robot, pose_steps(log, kinematic.model->measurement).shortest);
-  if (!errors || !errors->average()) {
+  const auto errors = errors_that_average(log, robot, kinematic.model);
+  if (!errors) {
     return;
   }
   core::Assumption assumption = assumed_pose(robot);
@@ -272,7 +303,7 @@ void learn_pose_at_risk(LogSource& log, Commissioning& result, const PoseAtRiskO
                             ? "the gyro's errors are not declared, and the wheels' set stands on them"
                             : "the bounds of radii and yaw gains are not guaranteed";
   } else {
-    PoseAtRisk said = pose_at_risk(log, *kinematic.model, *errors, result.survey.seconds, options);
+    PoseAtRisk said = made ? *made : pose_at_risk(log, *kinematic.model, *errors, result.survey.seconds, options);
     assumption.verdict = said.verdict;
     assumption.detail = said.detail;
     if (said.verdict == core::AssumptionVerdict::fails) {

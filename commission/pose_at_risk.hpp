@@ -52,9 +52,21 @@ struct PoseAtRisk {
                                       const detector::PoseErrors& errors, double seconds,
                                       const PoseAtRiskOptions& options = {});
 
+/// What a commissioning says of the kinematic residual alone.
+struct KinematicPart {
+  KinematicCommissioning residual;
+  std::optional<PoseAtRisk> at_risk;  ///< nothing where nothing is asked
+};
+
+/// The same that commission_robot() makes of it, as far as no other part of the result decides (whether there is a
+/// model, and what warrants it). Throws as that.
+[[nodiscard]] KinematicPart make_kinematic_part(LogSource& log, const Robot& robot, const CommissionOptions& options);
+
 /// Adds KinematicModel::at_risk to a guaranteed result whose robot file declares errors of the pose that average out,
 /// and the assumption with the log's verdict. Where the log contradicts it nothing is said, and a note says why.
-void learn_pose_at_risk(LogSource& log, Commissioning& result, const PoseAtRiskOptions& options = {});
+/// `made`: what pose_at_risk() said before.
+void learn_pose_at_risk(LogSource& log, Commissioning& result, const PoseAtRiskOptions& options = {},
+                        const std::optional<PoseAtRisk>& made = {});
 
 /// Shortest step between poses of `log`, and the median one, s; 0 where there are none.
 struct PoseSteps {

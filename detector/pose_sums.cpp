@@ -72,7 +72,8 @@ double pose_reach(const filter::SampleClass& sample, double L) {
   return 1.25 * std::sqrt(kShareOfUsual / (1.0 + kShareOfUsual)) * (radius + 1.0);
 }
 
-double size_of(const std::array<double, 2>& v) { return std::hypot(v[0], v[1]); }
+// Lengths and factors: neither so small nor so large that squares would leave the range of doubles.
+double size_of(const std::array<double, 2>& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1]); }
 double dot(const std::array<double, 2>& a, const std::array<double, 2>& b) { return a[0] * b[0] + a[1] * b[1]; }
 // aᵀJb: J turns by a right angle.
 double cross(const std::array<double, 2>& a, const std::array<double, 2>& b) { return a[1] * b[0] - a[0] * b[1]; }
@@ -359,7 +360,8 @@ void PoseSumDetector::take(const Step& step) {
       sum.l0 += telescoping.bias * size0;
       sum.l1 += telescoping.bias * size1;
       add_variance(of_position ? sum.position : sum.heading, telescoping,
-                   of_position ? position_proxy_ : heading_proxy_, of_position ? sum.reach_position : sum.reach_heading, size0, size1, dot(a0, a1));
+                   of_position ? position_proxy_ : heading_proxy_, of_position ? sum.reach_position : sum.reach_heading,
+                   size0, size1, dot(a0, a1));
       if (of_position) {
         const double b0 = 0.5 * x * d * f.turned1, b1 = 0.5 * (d * f.turned1 + f.turned);
         sum.l0 += heading_.bias * std::abs(b0);
