@@ -89,6 +89,7 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     const identify::TimeShiftedRows model(rows, identify::TimeEffect::delay, -reach, reach);
     identify::VariableProjectionOptions options = model.options();
     options.weights = fit.weights;
+    options.flat = 1e-6;  // what is left of the way is for the last steps, on the gradient alone
     options.scan = 1 + static_cast<int>(std::ceil((options.scan - 1) * reach / longest));
     const identify::SeparableFit found = identify::variable_projection(model, options);
     constexpr double kInside = 0.97;  // of the range that is searched: its end is no answer

@@ -89,11 +89,13 @@ class Problem {
     check::that(p.at.columns.rows() == rows() && p.at.columns.cols() == model_->columns() &&
                     (p.at.offset.size() == 0 || p.at.offset.size() == rows()),
                 "separable model", "values of the announced shape");
-    const auto weight = row_weights_.asDiagonal();
-    p.at.columns = weight * p.at.columns;
-    for (auto& d : p.at.columns_by) d = weight * d;
-    for (auto& d : p.at.offset_by) d = weight * d;
-    p.residual = p.at.offset.size() == 0 ? y_ : Eigen::VectorXd(y_ - weight * p.at.offset);
+    p.at.columns.array().colwise() *= row_weights_.array();
+    for (auto& d : p.at.columns_by) d.array().colwise() *= row_weights_.array();
+    for (auto& d : p.at.offset_by) d.array() *= row_weights_.array();
+    p.residual = y_;
+    if (p.at.offset.size() > 0) {
+      p.residual.array() -= row_weights_.array() * p.at.offset.array();
+    }
     p.linear = Eigen::VectorXd::Zero(model_->columns());
     if (model_->columns() == 0) {
       return p;
@@ -215,7 +217,8 @@ SearchEnd search(const Problem& problem, const VariableProjectionOptions& option
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_QR;
   solver.max_num_iterations = options.most_iterations;
-  solver.function_tolerance = solver.gradient_tolerance = solver.parameter_tolerance =
+  solver.function_tolerance = options.flat;
+  solver.gradient_tolerance = solver.parameter_tolerance =
       std::numeric_limits<double>::epsilon();
   solver.max_num_consecutive_invalid_steps = 20;
   solver.logging_type = ceres::SILENT;
@@ -379,6 +382,7 @@ SeparableFit variable_projection(const SeparableModel& model, const VariableProj
   check::that(options.most_iterations > 0, "most_iterations", "a number > 0");
   check::that(options.scan >= 2, "scan", "a number >= 2");
   check::positive(options.rank_tolerance, "rank_tolerance");
+  check::positive(options.flat, "flat");
   const Eigen::VectorXd lower = bound_or(options.lower, q, -kInfinity);
   const Eigen::VectorXd upper = bound_or(options.upper, q, kInfinity);
   check::that((lower.array() < upper.array()).all(), "bounds of a shape", "lower < upper");

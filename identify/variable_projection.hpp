@@ -46,6 +46,9 @@ struct VariableProjectionOptions {
   Eigen::VectorXd weights;        ///< w_i > 0 for each output, empty: all one
   int scan = 13;                  ///< >= 2, values of each shape on the grid
   int most_iterations = 500;      ///< > 0
+  /// Relative change of the cost (> 0) below which the search ends. Steps on the gradient alone follow, which find the
+  /// remaining digits where the cost is like a parabola by then; in a long narrow valley it is not.
+  double flat = std::numeric_limits<double>::epsilon();
   double rank_tolerance = 1e-13;  ///< diagonal of the pivoted triangular factor of unit columns below which a column
                                   ///< counts as linearly dependent on the others
   bool full_jacobian = true;      ///< Golub and Pereyra 1973; false: without its second term (Kaufman 1975)
