@@ -155,7 +155,8 @@ int run(const Arguments& a) {
     return detect(log, std::move(detector), watch);
   });
   const commission::KinematicWatch kinematic = commission::watch_kinematics(log, model, a.detector, watch);
-  const commission::RiskWatch at_risk = commission::watch_at_risk(log, model);
+  const commission::RiskWatch at_risk =
+      commission::watch_at_risk(log, model, static_cast<std::size_t>(std::max(a.common.threads, 1)));
   commission::EventIsolationOptions isolation;
   isolation.isolation.threads = static_cast<std::size_t>(std::max(a.common.threads, 1));
   const std::vector<detector::Isolation> isolations = commission::isolate_events(log, model, detection, isolation);

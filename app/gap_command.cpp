@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/core/for_all.hpp>
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/gap/diagnose.hpp>
@@ -286,11 +287,15 @@ int run(const Arguments& a) {
   const std::vector<SimulatorSource> sources = simulator_sources(a, robot);
   const std::vector<Effect> catalogue = gap::effect_catalogue(model::make_model(robot));
   check_without(a.without, catalogue);
-  const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::hidden);
-  logs::RecordedLog& log = *opened.log;
   const std::vector<std::filesystem::path>& reference = a.simulated.empty() ? a.baseline : a.simulated;
-  const SoundLog baseline =
-      reference.empty() ? SoundLog{} : open_sound_log(reference, robot, a.common, WheelPose::hidden);
+  SoundLog opened, baseline;
+  CommonOptions each = a.common;
+  each.threads = reference.empty() ? each.threads : std::max(each.threads / 2, 1);
+  core::both(
+      static_cast<std::size_t>(a.common.threads),
+      [&] { opened = open_sound_log(a.logs, robot, each, WheelPose::hidden); },
+      [&] { baseline = reference.empty() ? SoundLog{} : open_sound_log(reference, robot, each, WheelPose::hidden); });
+  logs::RecordedLog& log = *opened.log;
   logs::RecordedLog* const healthy = baseline.log.get();
   robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
   report::ReportContext context = report_context(a.common, log.report(), log);

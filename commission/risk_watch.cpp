@@ -3,9 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
+
+#include <wheelwright/core/for_all.hpp>
+#include <wheelwright/core/log.hpp>
 
 namespace wheelwright::commission {
 
@@ -63,17 +68,12 @@ double pose_false_alarms(const OnlineModel& model) {
 
 namespace {
 
-// A detector and where its columns are.
+// Walks `log` through a detector; `recorder` takes what it says.
 template <typename AnyDetector>
-struct Watched {
-  AnyDetector detector;
-  std::vector<std::size_t> pick;
-  std::vector<double> sample;
-
-  Watched(LogSource& log, const std::vector<std::string>& columns, AnyDetector watching)
-      : detector(std::move(watching)), pick(core::positions_of(log, columns)), sample(pick.size()) {}
-
-  void take(const LogBlock& block, std::size_t k, bool starts) {
+void record(LogSource& log, const std::vector<std::string>& columns, AnyDetector detector, RiskRecorder& recorder) {
+  const std::vector<std::size_t> pick = core::positions_of(log, columns);
+  std::vector<double> sample(pick.size());
+  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
     if (starts) {
       detector.restart();
     }
@@ -81,8 +81,9 @@ struct Watched {
       sample[c] = block.columns[pick[c]][k];
     }
     detector.step(block.t[k], sample);
-  }
-};
+    recorder.add(detector, block.t[k]);
+  });
+}
 
 }  // namespace
 
@@ -92,36 +93,32 @@ bool watches_pose(const LogSource& log, const OnlineModel& model) {
                              [&](const std::string& name) { return log.find(name).has_value(); });
 }
 
-RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge) {
+RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, std::size_t threads, double merge) {
   RiskRecorder of_torque(merge), of_pose(merge);  // an event of one residual is not to hide one of the other
   RiskWatch& watch = of_torque.watch();
-  std::optional<Watched<detector::ScaleDetector>> torque;
-  std::optional<Watched<detector::PoseSumDetector>> pose;
-  if (model.at_risk) {
-    torque.emplace(log, model.measurement.columns(),
-                   detector::ScaleDetector(model, {.false_alarms = torque_false_alarms(model)}));
-    watch.false_alarms += torque_false_alarms(model);
-  }
-  if (watches_pose(log, model)) {
-    pose.emplace(log, model.kinematic->measurement.columns(),
-                 detector::PoseSumDetector(*model.kinematic, {.false_alarms = pose_false_alarms(model)}));
-    watch.false_alarms += pose_false_alarms(model);
-    watch.pose = true;
-  }
-  watch.watched = torque || pose;
+  watch.pose = watches_pose(log, model);
+  watch.watched = model.at_risk || watch.pose;
   if (!watch.watched) {
     return {};
   }
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (torque) {
-      torque->take(block, k, starts);
-      of_torque.add(torque->detector, block.t[k]);
-    }
-    if (pose) {
-      pose->take(block, k, starts);
-      of_pose.add(pose->detector, block.t[k]);
-    }
-  });
+  const bool both = model.at_risk && watch.pose;
+  const std::unique_ptr<LogSource> other_walk = both && threads > 1 ? log.another_walk() : nullptr;
+  core::both(
+      other_walk ? threads : 1,
+      [&] {
+        if (model.at_risk) {
+          watch.false_alarms += torque_false_alarms(model);
+          record(log, model.measurement.columns(),
+                 detector::ScaleDetector(model, {.false_alarms = torque_false_alarms(model)}), of_torque);
+        }
+      },
+      [&] {
+        if (watch.pose) {
+          record(other_walk ? *other_walk : log, model.kinematic->measurement.columns(),
+                 detector::PoseSumDetector(*model.kinematic, {.false_alarms = pose_false_alarms(model)}), of_pose);
+        }
+      });
+  watch.false_alarms += watch.pose ? pose_false_alarms(model) : 0.0;
   const RiskWatch& other = of_pose.watch();
   watch.looks += other.looks;
   watch.utilisation = std::max(watch.utilisation, other.utilisation);

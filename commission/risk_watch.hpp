@@ -61,8 +61,9 @@ class RiskRecorder {
 [[nodiscard]] bool watches_pose(const LogSource& log, const OnlineModel& model);
 
 /// Walks `log` through the ScaleDetector of `model`, and through its PoseSumDetector where it has one and `log` has
-/// the pose's columns.
-[[nodiscard]] RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, double merge = 0.5);
+/// the pose's columns. The result does not depend on `threads`.
+[[nodiscard]] RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, std::size_t threads = 1,
+                                      double merge = 0.5);
 
 /// "bias or jump (tau_r)", "share of the effort (tau_r)", "mass": what the sum of an event looks for.
 [[nodiscard]] std::string sum_words(const detector::SumWeight& weight, const Model& model);

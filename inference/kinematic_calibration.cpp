@@ -54,6 +54,7 @@ struct Place {
 };
 
 // Where the robot is at the poses' stamps less δ, by the midpoint rule between wheel-speed samples (θ exactly).
+template <bool derivatives>
 std::vector<Place> predict(const Window& w, const KinematicOptions& o, const double* shared, const double* start) {
   const double right = 1.0 + shared[kAsymmetry], left = 1.0 - shared[kAsymmetry];
   const double per_forward = 0.5 * o.wheel_radius, forward = per_forward * shared[kScale];
@@ -66,21 +67,23 @@ std::vector<Place> predict(const Window& w, const KinematicOptions& o, const dou
     const double omega_r = w.right[k] + step * slope_r, omega_l = w.left[k] + step * slope_l;
     const double difference = right * omega_r - left * omega_l, sum = right * omega_r + left * omega_l;
     const double turn = step * turning * difference, way = step * forward * sum;
-    Gradient by_turn = Gradient::Zero(), by_way = Gradient::Zero();
-    by_turn[kTurn] = step * per_turning * difference;
-    by_turn[kAsymmetry] = step * turning * (omega_r + omega_l);
-    by_turn[kDelay] = by_delay * turning * (difference + step * (right * slope_r - left * slope_l));
-    by_way[kScale] = step * per_forward * sum;
-    by_way[kAsymmetry] = step * forward * (omega_r - omega_l);
-    by_way[kDelay] = by_delay * forward * (sum + step * (right * slope_r + left * slope_l));
     const double heading = at.theta + 0.5 * turn, c = std::cos(heading), s = std::sin(heading);
-    const Gradient by_heading = at.by_theta + 0.5 * by_turn;
     at.theta += turn;
     at.x += way * c;
     at.y += way * s;
-    at.by_theta += by_turn;
-    at.by_x += c * by_way - way * s * by_heading;
-    at.by_y += s * by_way + way * c * by_heading;
+    if constexpr (derivatives) {
+      Gradient by_turn = Gradient::Zero(), by_way = Gradient::Zero();
+      by_turn[kTurn] = step * per_turning * difference;
+      by_turn[kAsymmetry] = step * turning * (omega_r + omega_l);
+      by_turn[kDelay] = by_delay * turning * (difference + step * (right * slope_r - left * slope_l));
+      by_way[kScale] = step * per_forward * sum;
+      by_way[kAsymmetry] = step * forward * (omega_r - omega_l);
+      by_way[kDelay] = by_delay * forward * (sum + step * (right * slope_r + left * slope_l));
+      const Gradient by_heading = at.by_theta + 0.5 * by_turn;
+      at.by_theta += by_turn;
+      at.by_x += c * by_way - way * s * by_heading;
+      at.by_y += s * by_way + way * c * by_heading;
+    }
     return at;
   };
   std::vector<Place> places;
@@ -96,10 +99,12 @@ std::vector<Place> predict(const Window& w, const KinematicOptions& o, const dou
     const double c = std::cos(seen.theta), s = std::sin(seen.theta);
     seen.x += ahead * c;
     seen.y += ahead * s;
-    seen.by_x -= ahead * s * seen.by_theta;
-    seen.by_y += ahead * c * seen.by_theta;
-    seen.by_x[kOffset] += o.track_width * c;
-    seen.by_y[kOffset] += o.track_width * s;
+    if constexpr (derivatives) {
+      seen.by_x -= ahead * s * seen.by_theta;
+      seen.by_y += ahead * c * seen.by_theta;
+      seen.by_x[kOffset] += o.track_width * c;
+      seen.by_y[kOffset] += o.track_width * s;
+    }
   }
   return places;
 }
@@ -120,7 +125,16 @@ class WindowCost final : public ceres::CostFunction {
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const std::vector<Place> places = predict(*window_, *options_, parameters[0], parameters[1]);
+    if (jacobians == nullptr) {
+      return evaluate<false>(parameters, residuals, jacobians);
+    }
+    return evaluate<true>(parameters, residuals, jacobians);
+  }
+
+ private:
+  template <bool derivatives>
+  bool evaluate(const double* const* parameters, double* residuals, double** jacobians) const {
+    const std::vector<Place> places = predict<derivatives>(*window_, *options_, parameters[0], parameters[1]);
     int row = 0;
     const auto write = [&](double residual, const Gradient& gradient) {
       residuals[row] = residual;
@@ -151,7 +165,6 @@ class WindowCost final : public ceres::CostFunction {
     return true;
   }
 
- private:
   // √(Huber's loss of s over s), and its derivative by s.
   struct Drawn {
     double factor = 1.0, slope = 0.0;
@@ -303,7 +316,7 @@ class Fit {
   bool rescale() {
     std::vector<double> heading, position;
     for (const Window& w : windows_) {
-      const auto poses = predict(w, *options_, shared_.data(), w.start.data());
+      const auto poses = predict<false>(w, *options_, shared_.data(), w.start.data());
       for (std::size_t k = 0; k < poses.size(); ++k) {
         heading.push_back(poses[k].theta - w.poses[k].theta);
         position.push_back(poses[k].x - w.poses[k].x);
