@@ -156,7 +156,8 @@ std::unique_ptr<logs::RecordedLog> array_log(const py::dict& columns, const logs
   std::vector<std::unique_ptr<logs::RowFile>> files;
   files.push_back(std::make_unique<ArrayFile>(kept, std::move(out)));
   const py::gil_scoped_release unlocked;
-  return std::make_unique<logs::RowLog>(std::move(files), logs::RowLogOptions{options.block_rows, options.min_rows});
+  return std::make_unique<logs::RowLog>(
+      std::move(files), logs::RowLogOptions{options.block_rows, options.min_rows, 0});  // in memory already
 }
 
 std::vector<std::string> LogObject::paths() const {

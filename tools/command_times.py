@@ -37,14 +37,14 @@ COMMANDS = [
 ]
 
 
-def make(folder, program, rate):
+def make(folder, program, rate, duration=120):
     robot = (ROOT / "examples/robot.yaml").read_text(encoding="utf-8")
     robot = robot.replace("position: 0.002, heading: 0.003",
                           "position: {bound: 0.002, bias: 0.0001}, heading: {bound: 0.003, bias: 0.0001}")
     (folder / "robot.yaml").write_text(robot, encoding="utf-8")
     (folder / "designed.yaml").write_text(robot + "limits: {effort: 3.0}\n", encoding="utf-8")
     scenario = (ROOT / "examples/scenarios/healthy.yaml").read_text(encoding="utf-8").replace("../robot.yaml", "robot.yaml")
-    scenario = scenario.replace("duration: 60", "duration: 120").replace("rate: 100", f"rate: {rate}")
+    scenario = scenario.replace("duration: 60", f"duration: {duration:g}").replace("rate: 100", f"rate: {rate}")
     fault = "faults:\n  - {kind: wheel_radius_right, magnitude: -0.005, onset: 40}\n"
     for name, text in (("log", scenario), ("other", scenario.replace("seed: 2", "seed: 3")),
                        ("faulty", scenario.replace("seed: 2", "seed: 4") + fault)):

@@ -43,6 +43,34 @@ TEST_F(Choose, GivesADetectorAndWhatTheOthersCost) {
   EXPECT_EQ(files::read_json(path("again/model.json")).at("parameters"), model.at("parameters"));
 }
 
+// What is said of the pose is made once for all candidates, and what was commissioned on the way is not commissioned
+// again: the model is, to the last digit, that of commissioning with the chosen filter.
+TEST_F(Choose, TheModelIsThatOfCommission) {
+  put("posed.yaml",
+      "robot: posed_robot.yaml\nparameters: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}\n"
+      "trajectory: {kind: commissioning, speed: 0.6, yaw_rate: 1.2, period: 2}\nduration: 20\n"
+      "sensors: {effort: 0.02, position: 0.002, heading: 0.003, encoder_counts_per_turn: 4096, log: [angles, pose]}\n");
+  std::string robot = bytes(path("robot.yaml"));
+  const std::string worst_case = "position: 0.002, heading: 0.003";
+  const std::size_t at = robot.find(worst_case);
+  ASSERT_NE(at, std::string::npos);
+  robot.replace(at, worst_case.size(), "position: {bound: 0.002, bias: 0.0001}, heading: {bound: 0.003, bias: 0.0001}");
+  put("posed_robot.yaml", robot);
+  ASSERT_EQ(run("simulate posed.yaml --out posed.csv --quiet").code, 0);
+  const std::string choose = "choose posed.csv --robot posed_robot.yaml --fault wheel_radius=0.2 --window 0.5 --quiet";
+  for (const std::string threads : {"1", "2"}) {
+    ASSERT_EQ(run(choose + " --threads " + threads + " --out by_" + threads).code, 0);
+  }
+  EXPECT_EQ(bytes(path("by_1/choice.json")), bytes(path("by_2/choice.json")));
+  const Json chosen = files::read_json(path("by_1/model.json"));
+  EXPECT_EQ(chosen, files::read_json(path("by_2/model.json")));
+  ASSERT_FALSE(chosen.at("at_risk").is_null());
+  ASSERT_FALSE(chosen.at("kinematic").at("at_risk").is_null());
+  put("chosen.yaml", robot + files::read_json(path("by_1/choice.json")).at("robot_file").get<std::string>() + "\n");
+  ASSERT_EQ(run("commission posed.csv --robot chosen.yaml --out again --quiet").code, 0);
+  EXPECT_EQ(Json::diff(chosen, files::read_json(path("again/model.json"))).dump(), "[]");
+}
+
 // The robot file declares errors that average out: the answer at the risk stands beside the one for every noise, and
 // either can be asked for.
 TEST_F(Choose, SaysWhichGuaranteeDecides) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -63,6 +64,20 @@ TEST(TableSource, TheFirstRowStartsASegment) {
   EXPECT_EQ(source.find("b"), 1u);
   EXPECT_FALSE(source.find("c").has_value());
   EXPECT_EQ(source.median_step(), 0.5);
+}
+
+TEST(TableSource, AnotherWalkBeginsAtTheFirstRow) {
+  LogTable table;
+  table.names = {"a"};
+  table.t = {0.0, 1.0, 2.0, 3.0, 4.0};
+  table.columns = {{5.0, 6.0, 7.0, 8.0, 9.0}};
+  TableSource source(table, 2);
+  LogBlock block;
+  ASSERT_TRUE(source.next(block));
+  const std::unique_ptr<LogSource> other = source.another_walk();
+  EXPECT_EQ(read_all(*other).columns, table.columns);
+  ASSERT_TRUE(source.next(block));
+  EXPECT_EQ(block.first_row, 2U);
 }
 
 TEST(TableSource, MisuseIsRefused) {

@@ -66,6 +66,23 @@ TEST(TimeShift, DelayOfSinesIsFoundInEitherDirection) {
   }
 }
 
+// The search may end early: the steps on the gradient alone find the remaining digits.
+TEST(TimeShift, ASearchThatEndsEarlyFindsTheSameDigits) {
+  for (const double noise : {0.0, 0.1}) {
+    const RegressionBlock rows = sines(
+        600, one, [](double w) { return -0.0437 * w; }, noise);
+    const TimeShiftedRows model(rows, TimeEffect::delay, -0.1, 0.1);
+    VariableProjectionOptions options = model.options();
+    const SeparableFit exact = variable_projection(model, options);
+    options.flat = 1e-6;
+    const SeparableFit early = variable_projection(model, options);
+    EXPECT_EQ(early.end, SearchEnd::converged);
+    EXPECT_LT(early.iterations, exact.iterations);
+    EXPECT_NEAR(early.shape[0], exact.shape[0], 1e-10);
+    EXPECT_NEAR(early.standard_error[0], exact.standard_error[0], 1e-6 * exact.standard_error[0]);
+  }
+}
+
 TEST(TimeShift, LagOfTheEffortIsFound) {
   for (const double T : {0.003, 0.05, 0.2}) {
     const RegressionBlock rows = sines(

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <random>
 #include <span>
@@ -12,7 +13,10 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/logs/bag_write.hpp>
+#include <wheelwright/logs/csv.hpp>
+#include <wheelwright/logs/hdf5_log.hpp>
 #include <wheelwright/logs/ros_messages.hpp>
+#include <wheelwright/logs/row_log.hpp>
 
 #include <hdf5.h>
 
@@ -46,6 +50,27 @@ LogTable drive() {
   }
   table.segment_starts = {0, 700};
   return table;
+}
+
+std::vector<LogBlock> blocks_of(LogSource& log) {
+  std::vector<LogBlock> all;
+  LogBlock block;
+  log.rewind();
+  while (log.next(block)) {
+    all.push_back(block);
+  }
+  EXPECT_EQ(block.rows(), 0U);
+  return all;
+}
+
+void expect_alike(const std::vector<LogBlock>& a, const std::vector<LogBlock>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    EXPECT_EQ(a[k].first_row, b[k].first_row);
+    EXPECT_EQ(a[k].t, b[k].t);
+    EXPECT_EQ(a[k].columns, b[k].columns);
+    EXPECT_EQ(a[k].segment_starts, b[k].segment_starts);
+  }
 }
 
 class LogFile : public testing::ScratchTest {
@@ -82,6 +107,42 @@ void expect_same(const LogTable& read, const LogTable& written, double theta) {
     for (std::size_t k = 0; k < written.rows(); ++k) {
       ASSERT_NEAR(read.column(name)[k], written.column(name)[k], theta);
     }
+  }
+}
+
+// Rows that are kept are those that would be read anew, and can be walked by two at once.
+TEST_F(LogFile, KeptRowsAreThoseOfTheFile) {
+  write("log.csv", drive());
+  write("log.h5", drive());
+  for (const std::string name : {"log.csv", "log.h5"}) {
+    const auto open = [&](std::size_t kept_bytes) {
+      std::vector<std::unique_ptr<RowFile>> files;
+      for (int k = 0; k < 2; ++k) {
+        files.push_back(name == "log.csv" ? csv_file(path(name), {}) : hdf5_file(path(name), {}));
+      }
+      return RowLog(std::move(files), {.block_rows = 300, .kept_bytes = kept_bytes});
+    };
+    RowLog kept = open(std::size_t{1} << 29), read = open(0), little = open(12 * 8 * 4199);
+    const std::vector<LogBlock> rows = blocks_of(read);
+    EXPECT_EQ(rows.size(), 14U);
+    EXPECT_EQ(read.another_walk(), nullptr);
+    EXPECT_EQ(little.another_walk(), nullptr) << "of 14 blocks the last does not fit";
+    expect_alike(blocks_of(little), rows);
+    expect_alike(blocks_of(kept), rows);
+    expect_alike(blocks_of(kept), rows);
+    LogBlock block;
+    kept.rewind();
+    ASSERT_TRUE(kept.next(block));
+    std::unique_ptr<LogSource> other = kept.another_walk();
+    ASSERT_NE(other, nullptr);
+    EXPECT_EQ(other->columns(), kept.columns());
+    EXPECT_EQ(other->median_step(), kept.median_step());
+    ASSERT_TRUE(kept.next(block));
+    EXPECT_EQ(block.first_row, 300U);
+    expect_alike(blocks_of(*other), rows);
+    std::filesystem::remove(path(name));
+    expect_alike(blocks_of(*other->another_walk()), rows);
+    write(name, drive());
   }
 }
 
