@@ -259,7 +259,19 @@ class Fit {
              options.largest_delay > 0.0};
   }
 
+  // A delay that would leave its range stays at the end of it, and the rest is sought again: bounds in the search itself
+  // cost several times as many steps.
   bool solve() {
+    bool good = search(free_[kDelay]);
+    const double within = std::clamp(shared_[kDelay], 0.0, options_->largest_delay);
+    if (free_[kDelay] && within != shared_[kDelay]) {
+      shared_[kDelay] = within;
+      good = search(false);
+    }
+    return good;
+  }
+
+  bool search(bool delay) {
     ceres::Problem problem;
     auto* order = new ceres::ParameterBlockOrdering;
     for (Window& w : windows_) {
@@ -271,14 +283,11 @@ class Fit {
     std::vector<int> constant;
     for (int j = 0; j < kShared; ++j) {
       const bool needs_position = j == kScale || j == kOffset;
-      if (!free_[static_cast<std::size_t>(j)] || (needs_position && !position_)) constant.push_back(j);
+      const bool free = j == kDelay ? delay : free_[static_cast<std::size_t>(j)];
+      if (!free || (needs_position && !position_)) constant.push_back(j);
     }
     if (!constant.empty()) {
       problem.SetManifold(shared_.data(), new ceres::SubsetManifold(kShared, constant));
-    }
-    if (free_[kDelay]) {
-      problem.SetParameterLowerBound(shared_.data(), kDelay, 0.0);
-      problem.SetParameterUpperBound(shared_.data(), kDelay, options_->largest_delay);
     }
     ceres::Solver::Options solver;
     solver.linear_solver_type = ceres::DENSE_SCHUR;

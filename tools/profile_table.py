@@ -6,6 +6,7 @@
 """
 
 import collections
+import math
 import os
 import re
 import subprocess
@@ -37,10 +38,12 @@ STAGES = [
     ("filter, fit", ("commission::settle", "commission::fit_log")),
     ("set at risk", ("commission::declared_risk_set",)),
     ("errors like before", ("commission::serial_correlation",)),
-    ("reach, margins", ("commission::risk_reach", "commission::first_look", "commission::survey_margins")),
+    ("reach, margins", ("commission::risk_reach", "commission::first_look", "commission::survey_margins",
+                        "detector::margins_", "detector::solve_smallest_certain", "detector::pose_margins")),
     ("sums at risk", ("commission::learn_at_risk", "commission::watch_at_risk")),
     ("detector", ("commission::detect<", "commission::watch_kinematics")),
     ("gap", ("gap::",)),
+    ("identify", ("inference::",)),
 ]
 COUNTED = [
     ("rows", "wheelwright::logs::(anonymous namespace)::KeptRows::next"),
@@ -48,7 +51,7 @@ COUNTED = [
     ("kinematic", "wheelwright::filter::RowStream<wheelwright::filter::OdometryFilter>::next"),
     ("programs", "wheelwright::bounds::LinearProgram::solve"),
 ]
-BLOCK = 4096  # rows
+BLOCK = 4096  # rows that a walk hands out at once
 
 
 def stage_of(stack):
@@ -84,11 +87,24 @@ def bytes_read(program, command, folder):
     return read
 
 
+def symbols(program):
+    """The linker's name of each function that is counted."""
+    mangled, plain = (subprocess.run(["nm", *how, program], capture_output=True, text=True, check=True).stdout.splitlines()
+                      for how in ([], ["-C"]))
+    found = []
+    for _, function in COUNTED:
+        names = [a.split()[-1] for a, b in zip(mangled, plain) if f" {function}(" in b and "[clone" not in b]
+        if not names:
+            sys.exit(f"profile_table: {program}: no function {function}: expected a program with its symbols")
+        found.append(names[0])
+    return found
+
+
 def calls(program, command, folder):
     script = ["set breakpoint pending off", "set pagination off"]
-    for k, (_, function) in enumerate(COUNTED, 1):
-        script += [f"break {function}", f"ignore {k} 1000000000"]
-    script += ["run > /dev/null 2>&1", "info breakpoints"]
+    for k, symbol in enumerate(symbols(program), 1):
+        script += [f"break {symbol}", f"ignore {k} 1000000000"]
+    script += ["run", "info breakpoints"]
     options = [word for line in script for word in ("-ex", line)]
     told = subprocess.run(["gdb", "-batch", *options, "--args", program, *command.split(), "--quiet", "--out", "profiled"],
                           cwd=folder, capture_output=True, text=True, errors="replace").stdout
@@ -121,7 +137,8 @@ def main():
         read = bytes_read(program, command, folder)
         subprocess.run(["rm", "-rf", "profiled"], cwd=folder)
         n = calls(program, command, folder)
-        passes = {kind: n[kind] * BLOCK / rows for kind in ("rows", "torque", "kinematic")}
+        calls_a_walk = math.ceil(rows / BLOCK) + 1
+        passes = {kind: n[kind] / calls_a_walk / files for kind in ("rows", "torque", "kinematic")}
         counted.append(f"| {name} | {read / logs:.2f} | {passes['rows']:.1f} | {passes['torque']:.1f} | {passes['kinematic']:.1f} "
                        f"| {n['programs']} |")
     print("| command | processor | per row | of it |\n|---|---|---|---|")
