@@ -4,11 +4,11 @@
 
     tools/night.py [--robots N] [--cores N] [--seconds-a-robot S] [--shards-a-core N] ... [--table]
 
-Every shard is a job of one core: it starts, reads the list, examines its robots one after the other, stores each result,
-and ends. Cores have speeds of their own, some are slow; jobs die and begin again where they stopped; logs come from one
-file system that all cores share. The scheduler gives a core that is free the next shard. When the last one is done one
-process merges. Parameters are what was measured on the machine of docs/scale.md, or guesses that are named as such there.
-Everything is drawn from --seed. --table prints the table of docs/scale.md.
+Every shard is a job of one core: it starts, reads the list, examines its robots one after the other, stores each
+result, and ends. Cores have speeds of their own, some are slow; jobs die and begin again where they stopped; logs come
+from one file system that all cores share. The scheduler gives a core that is free the next shard. When the last one is
+done one process merges. Parameters are what was measured on the machine of docs/scale.md, or guesses that are named as
+such there. Everything is drawn from --seed. --table prints the table of docs/scale.md.
 """
 
 import argparse
@@ -39,7 +39,7 @@ PARAMETERS = {
 
 
 def simulate(p):
-    """Seconds until all shards are done and until the merge is, core-hours used, deaths, and what they were waiting for."""
+    """Seconds until all shards are done and until the merge is, core-hours used, deaths, waiting for logs."""
     draw = random.Random(p.seed)
     speed = [(p.slow if draw.random() < p.slow_share else 1.0) * draw.lognormvariate(0.0, p.speed_spread)
              for _ in range(p.cores)]
@@ -74,14 +74,14 @@ def simulate(p):
 
 def row(p, words):
     r = simulate(p)
-    return (f"| {words} | {r['shards'] / 60:.1f} min | {r['merged'] / 60:.1f} min | {r['core_hours']:.0f} h | {100 * r['idle']:.0f} % "
-            f"| {100 * r['waited']:.0f} % | {r['deaths']} |")
+    return (f"| {words} | {r['shards'] / 60:.1f} min | {r['merged'] / 60:.1f} min | {r['core_hours']:.0f} h "
+            f"| {100 * r['idle']:.0f} % | {100 * r['waited']:.0f} % | {r['deaths']} |")
 
 
 def table(p):
     def but(**changed):
         return argparse.Namespace(**{**vars(p), **changed})
-    print("| 10⁶ robots on 1,000 cores | shards done | merged | core-hours | cores idle | waiting for logs | deaths |\n"
+    print("| 10⁶ robots on 1,000 cores | shards done | merged | core-hours | cores idle | waiting | deaths |\n"
           "|---|---|---|---|---|---|---|")
     print(row(p, "as measured and guessed"))
     print(row(but(shards_a_core=1), "one shard a core"))
@@ -103,9 +103,10 @@ def main():
         table(p)
         return
     r = simulate(p)
-    print(f"{p.robots} robots on {p.cores} cores: shards done after {r['shards'] / 60:.1f} min, merged after {r['merged'] / 60:.1f} "
-          f"min; {r['core_hours']:.0f} core-hours, cores idle {100 * r['idle']:.0f} %, waiting for logs {100 * r['waited']:.0f} %, "
-          f"{r['deaths']} deaths, longest shard {r['longest'] / 60:.1f} min (seed {p.seed})")
+    print(f"{p.robots} robots on {p.cores} cores: shards done after {r['shards'] / 60:.1f} min, merged after "
+          f"{r['merged'] / 60:.1f} min; {r['core_hours']:.0f} core-hours, cores idle {100 * r['idle']:.0f} %, "
+          f"waiting for logs {100 * r['waited']:.0f} %, {r['deaths']} deaths, "
+          f"longest shard {r['longest'] / 60:.1f} min (seed {p.seed})")
 
 
 if __name__ == "__main__":

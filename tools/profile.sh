@@ -15,7 +15,10 @@ here=$(cd "$(dirname "$0")" && pwd)
 program=$(realpath "$1")
 seconds=${2:-900}
 for tool in perf gdb python3; do
-  command -v $tool >/dev/null || { echo "profile.sh: no $tool: expected it (Debian: linux-perf, gdb, python3)" >&2; exit 2; }
+  command -v $tool >/dev/null || {
+    echo "profile.sh: no $tool: expected it (Debian: linux-perf, gdb, python3)" >&2
+    exit 2
+  }
 done
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

@@ -64,14 +64,16 @@ def stage_of(stack):
 def shares(program, command, folder):
     """Seconds of processor, and the share of each stage."""
     data = folder / "perf.data"
-    subprocess.run(["perf", "record", "-q", "-F", "400", "--call-graph", "dwarf,32768", "-o", data, program, *command.split(),
-                    "--quiet", "--out", "profiled"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    subprocess.run(["perf", "record", "-q", "-F", "400", "--call-graph", "dwarf,32768", "-o", data, program,
+                    *command.split(), "--quiet", "--out", "profiled"],
+                   cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     text = subprocess.run(["perf", "script", "-i", data, "-F", "comm,ip,sym"], cwd=folder, capture_output=True,
                           text=True, errors="replace").stdout
     data.unlink()
     counts = collections.Counter()
     for sample in text.split("\n\n"):
-        stack = [line.strip().split(" ", 1)[-1].replace("(anonymous namespace)", "") for line in sample.splitlines()[1:]]
+        stack = [line.strip().split(" ", 1)[-1].replace("(anonymous namespace)", "")
+                 for line in sample.splitlines()[1:]]
         if stack:
             counts[stage_of(stack)] += 1
     total = sum(counts.values())
@@ -89,8 +91,9 @@ def bytes_read(program, command, folder):
 
 def symbols(program):
     """The linker's name of each function that is counted."""
-    mangled, plain = (subprocess.run(["nm", *how, program], capture_output=True, text=True, check=True).stdout.splitlines()
-                      for how in ([], ["-C"]))
+    mangled, plain = (
+        subprocess.run(["nm", *how, program], capture_output=True, text=True, check=True).stdout.splitlines()
+        for how in ([], ["-C"]))
     found = []
     for _, function in COUNTED:
         names = [a.split()[-1] for a, b in zip(mangled, plain) if f" {function}(" in b and "[clone" not in b]
@@ -106,8 +109,8 @@ def calls(program, command, folder):
         script += [f"break {symbol}", f"ignore {k} 1000000000"]
     script += ["run", "info breakpoints"]
     options = [word for line in script for word in ("-ex", line)]
-    told = subprocess.run(["gdb", "-batch", *options, "--args", program, *command.split(), "--quiet", "--out", "profiled"],
-                          cwd=folder, capture_output=True, text=True, errors="replace").stdout
+    told = subprocess.run(["gdb", "-batch", *options, "--args", program, *command.split(), "--quiet",
+                           "--out", "profiled"], cwd=folder, capture_output=True, text=True, errors="replace").stdout
     found = {}
     for k, (name, _) in enumerate(COUNTED, 1):
         entry = re.search(rf"^{k}\s+breakpoint.*?(?=^\d+\s+breakpoint|\Z)", told, re.M | re.S)
@@ -121,7 +124,8 @@ def main():
         sys.exit(__doc__.strip())
     program, seconds, folder = sys.argv[1], float(sys.argv[2]), Path(sys.argv[3])
     command_times.make(folder, program, 200, duration=seconds)
-    subprocess.run([program, *"commission log.csv --robot robot.yaml --out commission --quiet".split()], cwd=folder, check=True)
+    subprocess.run([program, *"commission log.csv --robot robot.yaml --out commission --quiet".split()], cwd=folder,
+                   check=True)
     rows = seconds * 200
     timed, counted = [], []
     for name, command in COMMANDS:
@@ -139,12 +143,12 @@ def main():
         n = calls(program, command, folder)
         calls_a_walk = math.ceil(rows / BLOCK) + 1
         passes = {kind: n[kind] / calls_a_walk / files for kind in ("rows", "torque", "kinematic")}
-        counted.append(f"| {name} | {read / logs:.2f} | {passes['rows']:.1f} | {passes['torque']:.1f} | {passes['kinematic']:.1f} "
-                       f"| {n['programs']} |")
+        counted.append(f"| {name} | {read / logs:.2f} | {passes['rows']:.1f} | {passes['torque']:.1f} "
+                       f"| {passes['kinematic']:.1f} | {n['programs']} |")
     print("| command | processor | per row | of it |\n|---|---|---|---|")
     print("\n".join(timed))
-    print("\n| command | bytes read, of the files' | walks of the rows | of them through the torque's filter | the kinematic one "
-          "| linear programs |\n|---|---|---|---|---|---|")
+    print("\n| command | bytes read, of the files' | walks of the rows | of them through the torque's filter "
+          "| the kinematic one | linear programs |\n|---|---|---|---|---|---|")
     print("\n".join(counted))
 
 
