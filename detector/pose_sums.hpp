@@ -168,9 +168,9 @@ class PoseSumDetector {
   std::vector<PoseWeight> weights_;
   filter::SampleClass position_{}, heading_{};
   double position_proxy_ = 0.0, heading_proxy_ = 0.0;  // for every λ
-  Eigen::VectorXd largest_, half_;  // |ϑ| at most, sides of the set's box from ϑ̂ on
-  Vector radius_{}, yaw_gain_{};    // at most
-  Eigen::Index gains_ = 0;          // position of the yaw gains among the parameters
+  Eigen::VectorXd largest_, half_;                     // |ϑ| at most, sides of the set's box from ϑ̂ on
+  Vector radius_{}, yaw_gain_{};                       // at most
+  Eigen::Index gains_ = 0;                             // position of the yaw gains among the parameters
   double beta_ = 1.0, lead_ = 0.0, correlation_ = 0.0;
   std::vector<Waiting> ring_;
   std::size_t oldest_ = 0, count_ = 0;

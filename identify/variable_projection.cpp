@@ -218,8 +218,7 @@ SearchEnd search(const Problem& problem, const VariableProjectionOptions& option
   solver.linear_solver_type = ceres::DENSE_QR;
   solver.max_num_iterations = options.most_iterations;
   solver.function_tolerance = options.flat;
-  solver.gradient_tolerance = solver.parameter_tolerance =
-      std::numeric_limits<double>::epsilon();
+  solver.gradient_tolerance = solver.parameter_tolerance = std::numeric_limits<double>::epsilon();
   solver.max_num_consecutive_invalid_steps = 20;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;

@@ -40,12 +40,12 @@ class SeparableModel {
 
 /// Search range and stopping rules.
 struct VariableProjectionOptions {
-  Eigen::VectorXd start;          ///< q; empty: the best of a grid of `scan` values of each shape (needs finite bounds)
-  Eigen::VectorXd lower;          ///< q, empty: none
-  Eigen::VectorXd upper;          ///< q, empty: none
-  Eigen::VectorXd weights;        ///< w_i > 0 for each output, empty: all one
-  int scan = 13;                  ///< >= 2, values of each shape on the grid
-  int most_iterations = 500;      ///< > 0
+  Eigen::VectorXd start;      ///< q; empty: the best of a grid of `scan` values of each shape (needs finite bounds)
+  Eigen::VectorXd lower;      ///< q, empty: none
+  Eigen::VectorXd upper;      ///< q, empty: none
+  Eigen::VectorXd weights;    ///< w_i > 0 for each output, empty: all one
+  int scan = 13;              ///< >= 2, values of each shape on the grid
+  int most_iterations = 500;  ///< > 0
   /// Relative change of the cost (> 0) below which the search ends. Steps on the gradient alone follow, which find the
   /// remaining digits where the cost is like a parabola by then; in a long narrow valley it is not.
   double flat = std::numeric_limits<double>::epsilon();

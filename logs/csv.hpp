@@ -22,7 +22,7 @@
 
 namespace wheelwright::logs {
 
-/// A log in one or several CSV files. Memory does not grow with the files.
+/// A log in one or several CSV files.
 class CsvLog final : public RowLog {
  public:
   /// Reads all of `paths` once, as RowLog does; columns() are those that all files have, in the order of the first.
