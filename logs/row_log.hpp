@@ -123,7 +123,7 @@ struct RowLogOptions {
   std::size_t block_rows = 4096;  ///< rows of a block, at least 1
   std::size_t min_rows = 20;      ///< usable rows that a log must have
   /// Rows are kept in memory where they need no more than this; those of a longer log are read anew by every walk.
-  std::size_t kept_bytes = std::size_t{1} << 29;
+  std::size_t kept_bytes = std::size_t{1} << 28;
 };
 
 /// A log over files, each of which begins a new segment. Memory does not grow with them beyond
