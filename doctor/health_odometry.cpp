@@ -6,6 +6,7 @@
 #include <complex>
 #include <numbers>
 #include <optional>
+#include <vector>
 
 #include <fmt/format.h>
 #include <Eigen/Dense>
@@ -331,6 +332,36 @@ void check_angles(const HealthView& view, std::vector<LogFinding>& out) {
   }
 }
 
+// Of a log longer than kLongEnough as many stretches of a minute, spread over it; else nothing.
+std::optional<LogTable> stretches_of(const HealthView& view) {
+  constexpr double kStretch = 60.0, kLongEnough = 1200.0;  // s
+  const LogTable& log = *view.log;
+  const auto rows_of = [&](double seconds) { return static_cast<std::size_t>(seconds / view.step); };
+  if (!(view.step > 0.0) || log.rows() <= rows_of(kLongEnough)) {
+    return std::nullopt;
+  }
+  LogTable spread;
+  spread.names = log.names;
+  spread.columns.resize(log.columns.size());
+  constexpr auto kStretches = static_cast<std::size_t>(kLongEnough / kStretch);
+  for (std::size_t k = 0; k < kStretches; ++k) {
+    const std::size_t first = k * log.rows() / kStretches;
+    const LogTable stretch = core::slice(log, first, std::min(first + rows_of(kStretch), log.rows()));
+    const std::size_t before = spread.rows();
+    spread.segment_starts.push_back(before);
+    for (const std::size_t start : stretch.segment_starts) {
+      if (start > 0) {
+        spread.segment_starts.push_back(before + start);
+      }
+    }
+    spread.t.insert(spread.t.end(), stretch.t.begin(), stretch.t.end());
+    for (std::size_t c = 0; c < spread.columns.size(); ++c) {
+      spread.columns[c].insert(spread.columns[c].end(), stretch.columns[c].begin(), stretch.columns[c].end());
+    }
+  }
+  return spread;
+}
+
 void check_pose_delay(const HealthView& view, std::vector<LogFinding>& out) {
   if (!view.robot_given || view.joints[0].speed == nullptr || view.joints[1].speed == nullptr) {
     return;
@@ -340,8 +371,10 @@ void check_pose_delay(const HealthView& view, std::vector<LogFinding>& out) {
   options.track_width = view.robot.track_width;
   options.radius = options.axle_offset = view.column("x") != nullptr && view.column("y") != nullptr;
   options.largest_delay = 0.3;
+  const std::optional<LogTable> spread = stretches_of(view);
   try {
-    const inference::KinematicQuantity delay = inference::calibrate_kinematics(*view.log, options).delay;
+    const inference::KinematicQuantity delay =
+        inference::calibrate_kinematics(spread ? *spread : *view.log, options).delay;
     if (delay.state == inference::KinematicState::identified) {
       const bool late = delay.estimate > 3.0 * delay.standard_error && delay.estimate > 1.5 * view.step;
       out.push_back(

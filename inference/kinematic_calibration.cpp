@@ -125,6 +125,11 @@ class WindowCost final : public ceres::CostFunction {
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    // The search may leave the range of the delay and come back; where the log does not show it, it shall not run away.
+    const double delay = parameters[0][kDelay], most = options_->largest_delay;
+    if (delay < -most || delay > 2.0 * most) {
+      return false;
+    }
     if (jacobians == nullptr) {
       return evaluate<false>(parameters, residuals, jacobians);
     }
@@ -259,13 +264,20 @@ class Fit {
              options.largest_delay > 0.0};
   }
 
-  // A delay that would leave its range stays at the end of it, and the rest is sought again: bounds in the search itself
-  // cost several times as many steps.
+  // A delay that would leave its range stays at the end of it, and the rest is sought once more: bounds in the search
+  // itself cost several times as many steps.
   bool solve() {
+    const SharedVector shared = shared_;
+    std::vector<std::array<double, 3>> starts(windows_.size());
+    std::ranges::transform(windows_, starts.begin(), &Window::start);
     bool good = search(free_[kDelay]);
     const double within = std::clamp(shared_[kDelay], 0.0, options_->largest_delay);
     if (free_[kDelay] && within != shared_[kDelay]) {
+      shared_ = shared;
       shared_[kDelay] = within;
+      for (std::size_t k = 0; k < starts.size(); ++k) {
+        windows_[k].start = starts[k];
+      }
       good = search(false);
     }
     return good;
@@ -293,6 +305,7 @@ class Fit {
     solver.linear_solver_type = ceres::DENSE_SCHUR;
     solver.linear_solver_ordering.reset(order);
     solver.max_num_iterations = 200;
+    solver.max_num_consecutive_invalid_steps = 20;
     solver.function_tolerance = 1e-12;
     solver.parameter_tolerance = 1e-10;
     solver.logging_type = ceres::SILENT;

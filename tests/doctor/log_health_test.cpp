@@ -262,6 +262,35 @@ TEST_F(LogHealthTest, ALatePoseIsTimed) {
   EXPECT_NEAR(expect("time.pose_delay", kWarning).value, 0.1, 0.02);
 }
 
+// Of a log longer than 20 min stretches are looked at, spread over it: here the pose is late in its second half alone.
+TEST_F(LogHealthTest, ALatePoseIsTimedInALongLogToo) {
+  const LogTable once = log;
+  LogTable late = once;
+  constexpr std::size_t kLate = 10;
+  for (const char* name : {"x", "y", "theta"}) {
+    std::vector<double>& column = late.column(name);
+    std::copy_backward(column.begin(), column.end() - kLate, column.end());
+  }
+  const double length = once.t.back() - once.t.front() + 1.0;
+  const auto times = static_cast<std::size_t>(std::ceil(1500.0 / length));
+  for (std::size_t k = 1; k < times; ++k) {
+    const LogTable& next = 2 * k < times ? once : late;
+    log.segment_starts.push_back(log.rows());
+    for (const double t : once.t) {
+      log.t.push_back(t + length * static_cast<double>(k));
+    }
+    for (std::size_t c = 0; c < log.columns.size(); ++c) {
+      log.columns[c].insert(log.columns[c].end(), next.columns[c].begin(), next.columns[c].end());
+    }
+  }
+  log.segment_starts.insert(log.segment_starts.begin(), 0);
+  const LogHealth health = examine(log, robot);
+  const LogFinding* const found = health.find("time.pose_delay");
+  ASSERT_NE(found, nullptr);
+  EXPECT_GT(found->value, 0.02) << found->sentence;
+  EXPECT_LT(found->value, 0.08) << found->sentence;
+}
+
 TEST_F(LogHealthTest, ADeadColumnIsFatalAndAStuckStretchIsPlaced) {
   std::vector<double>& speed = log.column("omega_l");
   std::fill(speed.begin() + 1500, speed.begin() + 1700, speed[1500]);

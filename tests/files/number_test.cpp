@@ -36,6 +36,36 @@ TEST(Number, ReadsWhatTheCLibraryReads) {
   }
 }
 
+// Numbers as logs have them: the shortest text of a double, and any 17 or 18 digits.
+TEST(Number, ReadsLongNumbersOfLogs) {
+  std::mt19937_64 random(3);
+  for (int k = 0; k < 300000; ++k) {
+    const std::uint64_t digits = random() % 1000000000000000000;
+    std::string text = std::to_string(digits);
+    if (k % 2 == 0) {
+      text = number_text(std::ldexp(static_cast<double>(digits) / 1e18, static_cast<int>(random() % 80) - 60));
+    } else if (k % 3 == 0) {
+      text += "e-" + std::to_string(random() % 30);
+    } else {
+      text.insert(random() % text.size(), ".");
+    }
+    ASSERT_EQ(bits(to_number(text).value()), bits(std::strtod(text.c_str(), nullptr))) << text;
+  }
+}
+
+// In the middle between two doubles, and a digit to either side of it.
+TEST(Number, RoundsTheMiddleOfTwoDoublesToEven) {
+  std::mt19937_64 random(4);
+  for (int k = 0; k < 100000; ++k) {
+    const std::uint64_t whole = (std::uint64_t{1} << 52) + random() % (std::uint64_t{1} << 52);
+    const std::string halves = std::to_string(whole) + ".5";
+    const std::string quarters = std::to_string(whole / 2) + (k % 2 == 0 ? ".25" : ".75");
+    for (const std::string& text : {halves, quarters, halves + "1", std::to_string(whole) + ".49"}) {
+      ASSERT_EQ(bits(to_number(text).value()), bits(std::strtod(text.c_str(), nullptr))) << text;
+    }
+  }
+}
+
 TEST(Number, RoundsHalfwayCasesToEven) {
   for (const char* text :
        {"9007199254740993", "9007199254740991", "1.00000000000000011102230246251565", "0.1e23", "1e23",
