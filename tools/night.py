@@ -19,9 +19,9 @@ PARAMETERS = {
     "robots": (1_000_000, "robots, one log each"),
     "cores": (1000, "cores"),
     "shards_a_core": (4, "shards for each core"),
-    "seconds_a_robot": (0.36, "processor's seconds for a robot (a log of 120 s at 200 Hz)"),
+    "seconds_a_robot": (0.75, "processor's seconds for a robot (a log of 120 s at 200 Hz with a pose)"),
     "spread": (0.2, "standard deviation of the logarithm of that, from robot to robot"),
-    "megabytes_a_robot": (2.6, "read for a robot"),
+    "megabytes_a_robot": (2.4, "read for a robot"),
     "store": (62e-6, "s, to store a result"),
     "start": (0.05, "s, to start the program"),
     "list": (3.5e-6, "s, to read a robot's line of the list; every shard reads all"),
@@ -33,7 +33,7 @@ PARAMETERS = {
     "again": (120.0, "s until a job that died begins again"),
     "disk": (10.0, "GB/s that the file system delivers to all together"),
     "opens": (20000.0, "files that it opens in a second"),
-    "merge": (85e-6, "s for a robot, to merge and to judge the fleet"),
+    "merge": (117e-6, "s for a robot, to merge and to judge the fleet"),
     "seed": (1, "seed"),
 }
 
