@@ -10,7 +10,7 @@
 
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/core/for_all.hpp>
+#include <wheelwright/commission/two_walks.hpp>
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/page.hpp>
@@ -71,13 +71,12 @@ int run(const Arguments& a) {
     logs::require_columns(log, robots::needed_columns(robot));
     Commissioning found = commission_robot(log, robot, options);
     if (!found.model.facets.empty() && !a.common.out.empty()) {
-      const std::unique_ptr<LogSource> other = log.another_walk();
-      core::both(
-          other ? options.threads : 1,
-          [&] {
-            context.own_log = detect(log, make_detector(found.model), {.most_points = report::most_chart_points});
+      commission::two_walks(
+          log, options.threads,
+          [&](LogSource& walk) {
+            context.own_log = detect(walk, make_detector(found.model), {.most_points = report::most_chart_points});
           },
-          [&] { context.seen = commission::first_look(other ? *other : log, found.model); });
+          [&](LogSource& walk) { context.seen = commission::first_look(walk, found.model); });
     }
     return found;
   });

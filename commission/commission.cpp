@@ -15,6 +15,7 @@
 #include <wheelwright/commission/fit.hpp>
 #include <wheelwright/commission/pose_at_risk.hpp>
 #include <wheelwright/commission/setting.hpp>
+#include <wheelwright/commission/two_walks.hpp>
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/filter/row_stream.hpp>
 
@@ -559,21 +560,21 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   result.folds = s.folds;
   result.model = described_model(s, options.persistence);
 
-  const Learnt learnt = learn_beside(log, s, options, result);
+  Learnt learnt = learn_beside(log, s, options, result);
   result.model.kinematic = result.kinematic.model;
   const Fit& fit = learnt.fit;
-  const Bounded& bounded = learnt.bounded;
+  Bounded& bounded = learnt.bounded;
   result.estimators = fit.choice;
   result.residuals = fit.residuals;
   result.rank = fit.squares.rank;
   result.condition = fit.squares.condition;
-  result.contradictions = learnt.signals.contradictions;
+  result.contradictions = std::move(learnt.signals.contradictions);
   if (learnt.signals.timing) {
     result.effort_shift = learnt.signals.timing->delay;
   }
-  result.feasible = bounded.result.set;
-  result.dropped = bounded.result.dropped;
-  result.earlier = bounded.earlier;
+  result.feasible = std::move(bounded.result.set);
+  result.dropped = std::move(bounded.result.dropped);
+  result.earlier = std::move(bounded.earlier);
   result.prior = s.prior;
   result.left_out = left_out(s, fit);
   result.row_errors = with_noise(s, result.noise, RowUse::learning);
@@ -646,14 +647,13 @@ Commissioning commission_robot(LogSource& log, const Robot& robot, const Commiss
   if (options.at_risk != CommissionOptions::AtRisk::nothing) {
     const AtRiskOptions at_risk{.reach = options.at_risk == CommissionOptions::AtRisk::reach,
                                 .threads = options.threads};
-    const std::unique_ptr<LogSource> other = options.threads > 1 ? log.another_walk() : nullptr;
     std::optional<RiskSet> set;
-    core::both(
-        other ? options.threads : 1,
-        [&] {
-          learn_pose_at_risk(log, result, {}, options.kinematic_part ? options.kinematic_part->at_risk : std::nullopt);
+    two_walks(
+        log, options.threads,
+        [&](LogSource& walk) {
+          learn_pose_at_risk(walk, result, {}, options.kinematic_part ? options.kinematic_part->at_risk : std::nullopt);
         },
-        [&] { set = declared_risk_set(other ? *other : log, result, at_risk); });
+        [&](LogSource& walk) { set = declared_risk_set(walk, result, at_risk); });
     learn_at_risk(log, result, at_risk, std::move(set));
   }
   return result;

@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/for_all.hpp>
+#include <wheelwright/commission/two_walks.hpp>
 #include <wheelwright/core/log.hpp>
 
 namespace wheelwright::commission {
@@ -101,20 +100,18 @@ RiskWatch watch_at_risk(LogSource& log, const OnlineModel& model, std::size_t th
   if (!watch.watched) {
     return {};
   }
-  const bool both = model.at_risk && watch.pose;
-  const std::unique_ptr<LogSource> other_walk = both && threads > 1 ? log.another_walk() : nullptr;
-  core::both(
-      other_walk ? threads : 1,
-      [&] {
+  two_walks(
+      log, model.at_risk && watch.pose ? threads : 1,
+      [&](LogSource& walk) {
         if (model.at_risk) {
           watch.false_alarms += torque_false_alarms(model);
-          record(log, model.measurement.columns(),
+          record(walk, model.measurement.columns(),
                  detector::ScaleDetector(model, {.false_alarms = torque_false_alarms(model)}), of_torque);
         }
       },
-      [&] {
+      [&](LogSource& walk) {
         if (watch.pose) {
-          record(other_walk ? *other_walk : log, model.kinematic->measurement.columns(),
+          record(walk, model.kinematic->measurement.columns(),
                  detector::PoseSumDetector(*model.kinematic, {.false_alarms = pose_false_alarms(model)}), of_pose);
         }
       });
