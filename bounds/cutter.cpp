@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <thread>
 #include <tuple>
 
 namespace wheelwright::bounds {
@@ -11,61 +10,7 @@ namespace {
 
 constexpr std::size_t kBatch = 512;        // fresh candidates that are worth a linear program
 constexpr std::size_t kPortion = 1 << 17;  // rows that are looked at before the box is made anew
-constexpr std::size_t kWorthAThread = 1 << 14;
 constexpr std::size_t kFew = 1 << 13;  // rows put aside that are not worth a look yet
-constexpr std::size_t kMostColumns = 32;
-
-/// Rows [first, first + count) of columns.
-class Portion {
- public:
-  Portion(const kernels::Slabs& all, std::size_t first, std::size_t count)
-      : Y_(all.Y, all.Y + all.p), dY_(all.dY, all.dY != nullptr ? all.dY + all.p : all.dY) {
-    for (auto* columns : {&Y_, &dY_}) {
-      for (const double*& column : *columns) {
-        column += first;
-      }
-    }
-    slabs_ = {Y_.data(), dY_.empty() ? nullptr : dY_.data(), all.y + first, all.dy + first, count, all.p};
-  }
-  [[nodiscard]] const kernels::Slabs& slabs() const { return slabs_; }
-
- private:
-  std::vector<const double*> Y_, dY_;
-  kernels::Slabs slabs_;
-};
-
-/// A loop that finds rows, split among threads; numbers ascending, as one thread finds them.
-template <class Loop>
-std::size_t split(const kernels::Slabs& slabs, std::size_t threads, std::vector<std::uint32_t>& found,
-                  const Loop& loop) {
-  found.resize(std::max(found.size(), slabs.n));
-  const std::size_t shares = std::min(threads, slabs.n / kWorthAThread);
-  if (shares < 2) {
-    return loop(slabs, found.data());
-  }
-  std::vector<std::size_t> first(shares + 1), count(shares);
-  for (std::size_t s = 0; s <= shares; ++s) {
-    first[s] = s == shares ? slabs.n : s * slabs.n / shares / kernels::kTile * kernels::kTile;
-  }
-  const auto search = [&](std::size_t s) {
-    const Portion own(slabs, first[s], first[s + 1] - first[s]);
-    count[s] = loop(own.slabs(), found.data() + first[s]);
-  };
-  {
-    std::vector<std::jthread> helpers;
-    for (std::size_t s = 1; s < shares; ++s) {
-      helpers.emplace_back(search, s);
-    }
-    search(0);
-  }
-  std::size_t total = count[0];
-  for (std::size_t s = 1; s < shares; ++s) {
-    for (std::size_t k = 0; k < count[s]; ++k) {
-      found[total++] = found[first[s] + k] + static_cast<std::uint32_t>(first[s]);
-    }
-  }
-  return total;
-}
 
 }  // namespace
 
@@ -152,14 +97,15 @@ std::span<const std::uint32_t> Cutter::search(const Part& part, const SlabColumn
     }
   }
   const kernels::Slabs slabs{Y.data(), dY.empty() ? nullptr : dY.data(), rows.y, rows.dy, rows.n, Y.size()};
+  found_.resize(std::max(found_.size(), rows.n));
   const kernels::Table& loops = kernels::best();
   const kernels::Oblique oblique{part.oblique_centre.data(), part.oblique_half.data(),
                                  part.planes->coordinates().transform.data()};
-  const std::size_t count = split(slabs, options_.threads, found_, [&](const kernels::Slabs& own, std::uint32_t* to) {
-    return corners
-               ? loops.violated(own, part.corners.data(), static_cast<std::size_t>(part.corners.cols()), to)
-               : loops.scan(own, part.centre.data(), part.half.data(), part.least.data(), &oblique, 0.0, to, nullptr);
-  });
+  const kernels::Points points{part.centre.data(), part.half.data(), part.least.data(), part.corners.data(),
+                               static_cast<std::size_t>(part.corners.cols())};
+  const std::size_t count = corners ? loops.examine(slabs, points, found_.data(), nullptr, nullptr)
+                                    : loops.scan(slabs, part.centre.data(), part.half.data(), part.least.data(),
+                                                 &oblique, 0.0, found_.data(), nullptr);
   return {found_.data(), count};
 }
 
@@ -176,7 +122,7 @@ bool Cutter::offer(const SlabColumns& columns, const std::vector<char>& used) {
         continue;
       }
       const std::span<const std::uint32_t> found = search(part, portion, false);
-      if (options_.facets || part.parameters.size() > kMostColumns) {
+      if (options_.facets) {
         if (!take(part, which, portion, found)) {
           return false;
         }
@@ -192,22 +138,6 @@ bool Cutter::offer(const SlabColumns& columns, const std::vector<char>& used) {
 }
 
 /// Cuts in rows that were put aside until no corner violates any, and drops those that the box then implies.
-namespace {
-
-// Rounds of settle() from which rows are looked at for having been there: a corner whose linear program fails stays where
-// it was and asks for the same row for ever.
-constexpr std::size_t kManyRounds = 20;
-
-// Whether every row from `first` on is one of those before.
-bool repeats(const std::vector<HalfSpace>& rows, std::size_t first) {
-  const auto old = rows.begin() + static_cast<std::ptrdiff_t>(first);
-  return std::all_of(old, rows.end(), [&](const HalfSpace& row) {
-    return std::any_of(rows.begin(), old, [&](const HalfSpace& each) { return each.origin == row.origin; });
-  });
-}
-
-}  // namespace
-
 bool Cutter::settle(Part& part, std::size_t which) {
   for (std::size_t round = 1; part.aside.size() > 0; ++round) {
     const SlabColumns rows = part.aside.view();
@@ -215,7 +145,7 @@ bool Cutter::settle(Part& part, std::size_t which) {
     if (!take(part, which, rows, search(part, rows, true)) || !tighten(part)) {
       return false;
     }
-    if (part.planes->rows().size() <= before || (round > kManyRounds && repeats(part.planes->rows(), before))) {
+    if (part.planes->stands_still(before, round)) {
       break;
     }
     if (passed_over_) {

@@ -17,7 +17,6 @@ namespace wheelwright::bounds {
 struct CutterOptions {
   bool facets = true;          ///< find all facets; false: only what sets the interval hull
   std::size_t most = 1 << 17;  ///< half-spaces kept or rows put aside, per block of parameters
-  std::size_t threads = 1;     ///< for the search of rows; the result does not depend on it
 };
 
 /// { θ in prior : all rows }, held as a product over independent blocks of parameters, with the few half-spaces of each

@@ -12,11 +12,12 @@ namespace wheelwright::bounds {
 namespace {
 
 constexpr double kCut = 1e-12;  // of the size of the set: a row that cuts less than that is left out
+constexpr std::size_t kManyRounds = 20;  // of cutting, from which rows are looked at for having been there
 
 }  // namespace
 
 CuttingPlanes::CuttingPlanes(const Box& box, const Eigen::MatrixXd& information, std::vector<std::size_t> parameters)
-    : box_(box), corners_(4 * box.dimension()) {
+    : box_(box), corners_(4 * box.dimension()), known_(4 * box.dimension(), 0) {
   check_finite(box, "box of cutting planes");
   coordinates_ = whitened(box, information);
   rows_ = sides_as_rows(box, parameters);
@@ -50,8 +51,8 @@ Box CuttingPlanes::outer_box() const {
   Box around = box_;
   for (Eigen::Index j = 0; j < p; ++j) {
     double low = centre[j] - half[j], high = centre[j] + half[j];
-    if (!corners_[static_cast<std::size_t>(2 * (p + j))].empty() &&
-        !corners_[static_cast<std::size_t>(2 * (p + j) + 1)].empty()) {
+    if (!corners_[static_cast<std::size_t>(2 * (p + j))].rows.empty() &&
+        !corners_[static_cast<std::size_t>(2 * (p + j) + 1)].rows.empty()) {
       const auto theta = [&](Eigen::Index k) {
         return coordinates_.centre[j] + coordinates_.transform.row(j).dot(vertices_.col(k));
       };
@@ -89,10 +90,14 @@ void CuttingPlanes::clear_program() {
   const Eigen::VectorXd room = (2.0 * (z_upper_ - z_lower_)).array() + 1.0;
   program_.emplace(z_lower_ - room, z_upper_ + room);
   norms_.resize(0);
+  std::fill(known_.begin(), known_.end(), std::size_t{0});
 }
 
 void CuttingPlanes::rebuild() {
   clear_program();
+  for (LinearProgram::Basis& corner : corners_) {
+    corner.inverse.clear();
+  }
   insert(rows_);
 }
 
@@ -125,9 +130,18 @@ void CuttingPlanes::recentre() {
 }
 
 /// Solves for the corners along θ, and (`oblique`) for those along z, which set the box of z.
-void CuttingPlanes::update_box(bool oblique) {
+/// False where one of the programs found no point at all.
+bool CuttingPlanes::update_box(bool oblique) {
   const Eigen::Index p = z_lower_.size();
+  bool feasible = true;
   for (Eigen::Index k = oblique ? 0 : 2 * p; k < 4 * p; ++k) {
+    // The set has only shrunk: a corner that satisfies what came since is the best one still.
+    std::size_t& known = known_[static_cast<std::size_t>(k)];
+    if (known > 0 && !(program_->violation(known, vertices_.col(k).data()) > kCut)) {
+      known = rows_.size();
+      continue;
+    }
+    known = 0;
     const Eigen::Index j = k / 2 % p;
     const double sign = k % 2 == 0 ? 1.0 : -1.0;
     Eigen::VectorXd direction = sign * Eigen::VectorXd::Unit(p, j);
@@ -136,8 +150,10 @@ void CuttingPlanes::update_box(bool oblique) {
     }
     const LpSolution solution = program_->maximise(direction, corners_[static_cast<std::size_t>(k)]);
     if (solution.status != LpSolution::Status::optimal) {
+      feasible = feasible && solution.status != LpSolution::Status::infeasible;
       continue;
     }
+    known = rows_.size();
     vertices_.col(k) = solution.x;
     if (k < 2 * p) {
       double& side = sign > 0.0 ? z_upper_[j] : z_lower_[j];
@@ -149,14 +165,11 @@ void CuttingPlanes::update_box(bool oblique) {
       std::swap(z_lower_[j], z_upper_[j]);
     }
   }
+  return feasible;
 }
 
-bool CuttingPlanes::resolve_infeasibility(std::size_t first_new) {
-  const auto p = static_cast<Eigen::Index>(box_.dimension());
-  const LpSolution probe = program_->maximise(Eigen::VectorXd::Unit(p, 0));
-  if (probe.status != LpSolution::Status::infeasible) {
-    return false;
-  }
+/// Proves the rows contradictory, or drops those from `first_new` on.
+void CuttingPlanes::resolve_infeasibility(std::size_t first_new) {
   std::vector<HalfSpace> data;
   for (const HalfSpace& row : rows_) {
     if (!row.origin.is_prior) {
@@ -167,9 +180,10 @@ bool CuttingPlanes::resolve_infeasibility(std::size_t first_new) {
   if (!contradiction_) {
     undecided_ += rows_.size() - first_new;
     rows_.resize(first_new);
+    std::fill(corners_.begin(), corners_.end(), LinearProgram::Basis{});
     rebuild();
+    update_box();
   }
-  return true;
 }
 
 struct CuttingPlanes::Whitened {
@@ -183,43 +197,45 @@ struct CuttingPlanes::Whitened {
   [[nodiscard]] bool dropped(std::size_t i) const { return b[i] == std::numeric_limits<double>::infinity(); }
 };
 
-std::vector<std::size_t> CuttingPlanes::open(const RowBank& candidates, std::span<const std::size_t> numbers) const {
+/// The candidates `numbers` in z; `open_only`: those of them that the box of z does not imply.
+CuttingPlanes::Whitened CuttingPlanes::whiten(const RowBank& candidates, std::span<const std::size_t> numbers,
+                                              bool open_only) const {
   const auto p = static_cast<Eigen::Index>(box_.dimension());
-  std::vector<std::size_t> left;
-  Eigen::VectorXd g(p);
-  const Eigen::VectorXd half = 0.5 * (z_upper_ - z_lower_), centre = middle();
-  for (const std::size_t i : numbers) {
-    const Eigen::Map<const Eigen::VectorXd> a(candidates.a.data() + static_cast<Eigen::Index>(i) * p, p);
-    double reach = a.dot(centre) - candidates.b[i];
-    for (Eigen::Index j = 0; j < p && reach <= 0.0; ++j) {
-      reach += std::abs(coordinates_.transform.col(j).dot(a)) * half[j];
-    }
-    if (reach > 0.0) {
-      left.push_back(i);
-    }
-  }
-  return left;
-}
-
-CuttingPlanes::Whitened CuttingPlanes::whiten(const RowBank& candidates, std::vector<std::size_t> numbers) const {
-  const auto p = static_cast<Eigen::Index>(box_.dimension());
+  const Eigen::VectorXd half = 0.5 * (z_upper_ - z_lower_), middle = 0.5 * (z_upper_ + z_lower_);
   Whitened result;
   result.p = box_.dimension();
   result.stride = (numbers.size() + kernels::kLanes - 1) / kernels::kLanes * kernels::kLanes;
   result.a.assign(result.stride * result.p, 0.0);
   result.b.assign(result.stride, std::numeric_limits<double>::infinity());
-  Eigen::VectorXd g(p);
-  for (std::size_t k = 0; k < numbers.size(); ++k) {
-    const Eigen::Map<const Eigen::VectorXd> a(candidates.a.data() + static_cast<Eigen::Index>(numbers[k]) * p, p);
-    g.noalias() = coordinates_.transform.transpose() * a;
-    const double norm = std::max(g.norm(), 1e-300);
-    for (Eigen::Index j = 0; j < p; ++j) {
-      result.a[static_cast<std::size_t>(j) * result.stride + k] = g[j] / norm;
+  // Many at a time, for the sake of the product.
+  constexpr Eigen::Index kMany = 64;
+  Eigen::MatrixXd a(p, kMany), g(p, kMany);
+  for (std::size_t first = 0; first < numbers.size(); first += kMany) {
+    const auto count = static_cast<Eigen::Index>(std::min<std::size_t>(kMany, numbers.size() - first));
+    for (Eigen::Index c = 0; c < count; ++c) {
+      std::copy_n(candidates.normal(numbers[first + static_cast<std::size_t>(c)]).data(), p, a.col(c).data());
     }
-    result.b[k] = (candidates.b[numbers[k]] - a.dot(coordinates_.centre)) / norm;
+    g.leftCols(count).noalias() = coordinates_.transform.transpose() * a.leftCols(count);
+    for (Eigen::Index c = 0; c < count; ++c) {
+      const std::size_t number = numbers[first + static_cast<std::size_t>(c)];
+      const double rest = candidates.b[number] - a.col(c).dot(coordinates_.centre);
+      if (open_only && !(g.col(c).dot(middle) + g.col(c).cwiseAbs().dot(half) > rest)) {
+        continue;
+      }
+      const std::size_t k = result.numbers.size();
+      const double norm = std::max(g.col(c).norm(), 1e-300);
+      for (Eigen::Index j = 0; j < p; ++j) {
+        result.a[static_cast<std::size_t>(j) * result.stride + k] = g(j, c) / norm;
+      }
+      result.b[k] = rest / norm;
+      result.numbers.push_back(number);
+    }
   }
-  result.numbers = std::move(numbers);
   return result;
+}
+
+std::vector<std::size_t> CuttingPlanes::open(const RowBank& candidates, std::span<const std::size_t> numbers) const {
+  return whiten(candidates, numbers, true).numbers;
 }
 
 std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates, bool hull_only) {
@@ -234,14 +250,10 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates, b
       return {};
     }
   }
-  numbers = open(candidates, numbers);
-  if (numbers.empty()) {
-    return numbers;
-  }
   if (rows_.size() <= static_cast<std::size_t>(2 * p)) {
     update_box();
   }
-  Whitened bank = whiten(candidates, std::move(numbers));
+  Whitened bank = whiten(candidates, numbers, true);
   // The box of z is needed now and then only where no facets are looked for.
   bool stale = false;
   for (int round = 1;; ++round) {
@@ -263,11 +275,13 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates, b
       bank.drop(i);
     }
     insert(std::span(rows_).subspan(first_new));
-    if (resolve_infeasibility(first_new) && is_empty()) {
-      return {};
-    }
     stale = hull_only && round % 4 != 0;
-    update_box(!stale);
+    if (!update_box(!stale)) {
+      resolve_infeasibility(first_new);
+      if (is_empty()) {
+        return {};
+      }
+    }
     const Eigen::VectorXd half = (0.5 * (z_upper_ - z_lower_)).cwiseMax(resolution());
     if (half.minCoeff() < 0.05) {
       recentre();
@@ -277,7 +291,7 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates, b
           kept.push_back(bank.numbers[i]);
         }
       }
-      bank = whiten(candidates, open(candidates, kept));
+      bank = whiten(candidates, kept, true);
     }
   }
   if (stale) {
@@ -292,12 +306,18 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates, b
   return open(candidates, left);
 }
 
-std::size_t CuttingPlanes::add_to_hull(const RowBank& candidates) {
-  const std::size_t before = rows_.size();
-  if (!is_empty()) {
-    cut_corners(candidates, true);
+std::vector<std::size_t> CuttingPlanes::add_to_hull(const RowBank& candidates) {
+  return is_empty() ? std::vector<std::size_t>{} : cut_corners(candidates, true);
+}
+
+bool CuttingPlanes::stands_still(std::size_t before, std::size_t round) const {
+  if (rows_.size() <= before) {
+    return true;
   }
-  return rows_.size() - before;
+  const auto old = rows_.begin() + static_cast<std::ptrdiff_t>(before);
+  return round > kManyRounds && std::all_of(old, rows_.end(), [&](const HalfSpace& row) {
+           return std::any_of(rows_.begin(), old, [&](const HalfSpace& each) { return each.origin == row.origin; });
+         });
 }
 
 Eigen::MatrixXd CuttingPlanes::extreme_points() const {
@@ -356,7 +376,7 @@ void CuttingPlanes::add(const RowBank& candidates) {
   std::stable_partition(left.begin(), left.end(), [&](std::size_t i) {
     return towards.dot(Eigen::Map<const Eigen::VectorXd>(candidates.normal(i).data(), towards.size())) >= 0.0;
   });
-  Whitened bank = whiten(candidates, left);
+  Whitened bank = whiten(candidates, left, false);
   take_facets(bank, [&](std::size_t facet) {
     rows_.push_back(candidates.at(bank.numbers[facet]));
     insert(std::span(rows_).last(1));
@@ -382,7 +402,7 @@ void CuttingPlanes::reduce() {
   }
   std::vector<std::size_t> everyone(rows_.size());
   std::iota(everyone.begin(), everyone.end(), std::size_t{0});
-  Whitened bank = whiten(all, std::move(everyone));
+  Whitened bank = whiten(all, everyone, false);
   clear_program();
   std::vector<std::size_t> facets;
   take_facets(bank, [&](std::size_t facet) {
@@ -401,16 +421,16 @@ void CuttingPlanes::reduce() {
   update_box();
 }
 
-CertifiedBound CuttingPlanes::certified_maximum(const Eigen::VectorXd& a, const Box& within) {
+CertifiedBound CuttingPlanes::certified_maximum(const Eigen::VectorXd& a, const Box& within,
+                                                LinearProgram::Basis basis) {
   const std::span<const double> direction(a.data(), static_cast<std::size_t>(a.size()));
   CertifiedBound bound{within.support(direction), {}};
-  LinearProgram::Basis basis;
   const LpSolution solution = program_->maximise(coordinates_.transform.transpose() * a, basis);
   if (solution.status != LpSolution::Status::optimal) {
     return bound;
   }
   std::vector<const HalfSpace*> vertex;
-  for (const int i : basis) {
+  for (const int i : basis.rows) {
     if (i >= 0) {
       vertex.push_back(&rows_[static_cast<std::size_t>(i)]);
     }
@@ -431,8 +451,9 @@ std::pair<std::vector<CertifiedBound>, std::vector<CertifiedBound>> CuttingPlane
   std::vector<CertifiedBound> lower, upper;
   Box first = box_;
   for (Eigen::Index j = 0; j < p; ++j) {
-    lower.push_back(certified_maximum(-Eigen::VectorXd::Unit(p, j), box_));
-    upper.push_back(certified_maximum(Eigen::VectorXd::Unit(p, j), box_));
+    const auto above = static_cast<std::size_t>(2 * (p + j));
+    lower.push_back(certified_maximum(-Eigen::VectorXd::Unit(p, j), box_, corners_[above + 1]));
+    upper.push_back(certified_maximum(Eigen::VectorXd::Unit(p, j), box_, corners_[above]));
     first.sides[static_cast<std::size_t>(j)] = {-lower.back().value, upper.back().value};
   }
   // Once more over the hull just proved: what is left of a − Aᵀλ then meets a small box.

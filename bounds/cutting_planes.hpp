@@ -45,8 +45,13 @@ class CuttingPlanes {
   /// until none is violated there; then, one linear program each, what cuts between these vertices.
   void add(const RowBank& candidates);
   /// Adds only rows that move a vertex where one of the z or θ is largest or smallest, until `candidates` move none:
-  /// enough for the interval hull of the set of `rows` and `candidates`, though not for the set. How many were added.
-  std::size_t add_to_hull(const RowBank& candidates);
+  /// enough for the interval hull of the set of `rows` and `candidates`, though not for the set. Numbers of those that
+  /// were not added and may move a vertex yet once other rows are added.
+  std::vector<std::size_t> add_to_hull(const RowBank& candidates);
+  /// Whether cutting has come to its end: nothing was added to the first `before` rows or, where `round` is large, only
+  /// rows that are among them. (A corner whose linear program fails stays where it was and asks for the same row for
+  /// ever.)
+  [[nodiscard]] bool stands_still(std::size_t before, std::size_t round) const;
   /// Drops every row that the others imply.
   void reduce();
 
@@ -63,8 +68,6 @@ class CuttingPlanes {
 
   /// max a·θ by linear program, uncertified; nothing where the program fails.
   [[nodiscard]] std::optional<LpSolution> maximise(const Eigen::VectorXd& a);
-  /// Rigorous upper bound of a·θ over the set, proved over `within`, a box that contains the set.
-  [[nodiscard]] CertifiedBound certified_maximum(const Eigen::VectorXd& a, const Box& within);
   /// Certified lower and upper bounds, 2p of them: bound j of the first is min θ_j, of the second max θ_j.
   [[nodiscard]] std::pair<std::vector<CertifiedBound>, std::vector<CertifiedBound>> certified_hull();
 
@@ -72,21 +75,25 @@ class CuttingPlanes {
   /// Candidates in z, by columns.
   struct Whitened;
 
+  /// Rigorous upper bound of a·θ over the set, proved over `within`, a box that contains the set. The search begins at
+  /// `basis`.
+  [[nodiscard]] CertifiedBound certified_maximum(const Eigen::VectorXd& a, const Box& within,
+                                                 LinearProgram::Basis basis);
   void insert(std::span<const HalfSpace> rows);
   void clear_program();
   void rebuild();
   template <class Keep>
   void take_facets(Whitened& bank, Keep keep);
   [[nodiscard]] Eigen::VectorXd middle() const;
-  void update_box(bool oblique = true);
+  bool update_box(bool oblique = true);
   void recentre();
-  [[nodiscard]] Whitened whiten(const RowBank& candidates, std::vector<std::size_t> numbers) const;
+  [[nodiscard]] Whitened whiten(const RowBank& candidates, std::span<const std::size_t> numbers, bool open_only) const;
   [[nodiscard]] std::vector<std::size_t> open(const RowBank& candidates, std::span<const std::size_t> numbers) const;
   /// What add_to_hull() leaves open: numbers of candidates that no closed form shows to be implied.
   std::vector<std::size_t> cut_corners(const RowBank& candidates, bool hull_only);
   /// Half-widths below which an axis of z is as good as flat: a few units in the last place of θ.
   [[nodiscard]] Eigen::VectorXd resolution() const;
-  bool resolve_infeasibility(std::size_t first_new);
+  void resolve_infeasibility(std::size_t first_new);
 
   Box box_;
   Coordinates coordinates_;
@@ -94,6 +101,7 @@ class CuttingPlanes {
   Eigen::VectorXd norms_;
   std::optional<LinearProgram> program_;
   std::vector<LinearProgram::Basis> corners_;
+  std::vector<std::size_t> known_;  // rows of the program that a corner is known to be the best of; 0: none
   Eigen::VectorXd z_lower_, z_upper_;
   Eigen::MatrixXd vertices_;
   std::size_t reduced_size_;

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include <wheelwright/bounds/cutter.hpp>
+#include <wheelwright/bounds/hull_search.hpp>
 #include <wheelwright/bounds/survey.hpp>
 
 namespace wheelwright::bounds {
@@ -188,6 +189,14 @@ namespace {
 
 constexpr std::size_t kMostPasses = 16;
 
+void certify(std::pair<std::vector<CertifiedBound>, std::vector<CertifiedBound>> bounds, IntervalHull& result) {
+  std::tie(result.lower, result.upper) = std::move(bounds);
+  for (std::size_t j = 0; j < result.lower.size(); ++j) {
+    const double low = result.lower[j].value, high = result.upper[j].value;
+    result.hull.sides[j] = {std::min(low, high), std::max(low, high)};
+  }
+}
+
 IntervalHull hull_of(Cutter& cutter, const Box& prior, const std::function<bool()>& pass) {
   IntervalHull result;
   result.hull = prior;
@@ -203,11 +212,7 @@ IntervalHull hull_of(Cutter& cutter, const Box& prior, const std::function<bool(
     result.contradiction = cutter.contradiction();
     return result;
   }
-  std::tie(result.lower, result.upper) = cutter.certified_hull();
-  for (std::size_t j = 0; j < prior.dimension(); ++j) {
-    const double low = result.lower[j].value, high = result.upper[j].value;
-    result.hull.sides[j] = {std::min(low, high), std::max(low, high)};
-  }
+  certify(cutter.certified_hull(), result);
   return result;
 }
 
@@ -218,14 +223,19 @@ IntervalHull interval_hull(const SlabColumns& rows, const Box& prior, const Inte
               "one side per parameter of the regression");
   check_finite(prior, "prior box");
   const SpreadSample sample(rows);
-  std::vector<std::size_t> everyone(prior.dimension());
-  std::iota(everyone.begin(), everyone.end(), std::size_t{0});
-  Cutter cutter(prior, {everyone}, sample.information(prior),
-                {.facets = false, .most = options.most_rows, .threads = options.threads});
-  if (!sample.each_level([&](const SlabColumns& level) { return cutter.offer(level) && cutter.tighten(); })) {
-    return hull_of(cutter, prior, [] { return false; });
+  HullSearch search(prior, sample.information(prior), options.threads);
+  IntervalHull result;
+  result.hull = prior;
+  result.passes = 1;
+  const auto cut = [&](const SlabColumns& some) { return search.cut(some); };
+  result.empty = !(sample.each_level(cut) && cut(rows));
+  result.candidates = search.candidates();
+  if (result.empty) {
+    result.contradiction = search.planes().contradiction();
+  } else {
+    certify(search.planes().certified_hull(), result);
   }
-  return hull_of(cutter, prior, [&] { return cutter.offer(rows); });
+  return result;
 }
 
 IntervalHull interval_hull(core::RegressionSource& source, const Box& prior, const IntervalHullOptions& options) {

@@ -92,7 +92,7 @@ class ColumnPacker {
 struct IntervalHullOptions {
   std::vector<std::size_t> excluded_samples;  ///< row numbers left out, any order (regression sources only)
   std::size_t threads = 1;                    ///< for rows in memory; the result does not depend on it
-  std::size_t most_rows = 1 << 20;            ///< half-spaces kept between passes; less means more passes
+  std::size_t most_rows = 1 << 20;  ///< half-spaces kept between passes; less means more passes (sources only)
 };
 
 /// Result of interval_hull().
@@ -109,9 +109,10 @@ struct IntervalHull {
 
 /// Interval hull of { θ in prior : |y − Y°θ| <= dy, |Y° − Y| <= dY for every row }.
 ///
-/// A set is cut with an evenly spread sample first (some 16 000 rows); then every pass over the rows compares each with
-/// a box around the set held and keeps what may cut, until the 2p vertices where a parameter is smallest or largest
-/// satisfy all of these. One pass over rows in memory, or two over a source (the first surveys it), as long as the rows
+/// A set is cut with an evenly spread sample first (some 16 000 rows); then the rows are compared with a box around the
+/// set held and those that may cut with the 2p vertices where a parameter is smallest or largest, until these satisfy all
+/// of them. Rows in memory are read once, and once more as far as they may matter (hull_search.hpp: one pass); a source
+/// is walked twice (the first pass surveys it, the second keeps what may cut), as long as the rows
 /// that matter fit into `most_rows`. Bounds are certified (certificate.hpp). Signs that the prior leaves open in noisy
 /// columns are relaxed to the chords of SlabRows; feasible_set() examines them one by one.
 ///

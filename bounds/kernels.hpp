@@ -34,6 +34,16 @@ struct Oblique {
   const double* transform = nullptr;  ///< T by columns, p × p
 };
 
+/// Points inside a box.
+struct Points {
+  const double* centre = nullptr;  ///< of the box, p numbers
+  const double* half = nullptr;    ///< its half-widths, p numbers
+  const double* least = nullptr;   ///< the smallest |θ_j| in it, p numbers
+  const double* points = nullptr;  ///< p numbers each, one point after the other
+  std::size_t count = 0;           ///< how many
+  double share = 1.0;              ///< of what is allowed, that a row may come to
+};
+
 /// A row and a number.
 struct Found {
   std::size_t row = 0;
@@ -66,9 +76,12 @@ struct Table {
   /// that are raised to the largest |Y_j| of all rows, and to the largest |y|.
   std::size_t (*scan)(const Slabs& slabs, const double* centre, const double* half, const double* least,
                       const Oblique* oblique, double floor, std::uint32_t* found, double* peaks);
-  /// Numbers of the rows without |y − Y·x| <= dy + Σ dY_j |x_j| for all of the `count` points x (p numbers each, one
-  /// point after the other; p <= 32), ascending; how many. Rows that hold a NaN are among them. `found` has room for n.
-  std::size_t (*violated)(const Slabs& slabs, const double* points, std::size_t count, std::uint32_t* found);
+  /// Numbers of the rows without |y − Y·x| <= share (dy + Σ dY_j |x_j|) for all points x, ascending; how many. Rows that
+  /// hold a NaN are among them. `found` has room for n. `open`, unless null, one for every kLanes rows: where it is 0 they
+  /// are not looked at, and it is set to 0 where the box implies all of them. `most`, unless null, is raised to the
+  /// largest Σ (|Y_j| + dY_j) half_j / (dy + Σ dY_j least_j) of the rows that it does not imply. Those that it does are
+  /// never among the numbers.
+  std::size_t (*examine)(const Slabs& slabs, const Points& at, std::uint32_t* found, unsigned char* open, double* most);
 };
 
 /// The variants that this processor can run, slowest first; the first is always there.

@@ -5,6 +5,10 @@
 /// keeps for all.
 #pragma once
 
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
 #include <wheelwright/bounds/kernels.hpp>
 
 namespace wheelwright::bounds::kernels {
@@ -36,17 +40,36 @@ struct Loops {
   }
   static void store(double* to, Vector v) { __builtin_memcpy(to, &v, sizeof v); }
   static Vector all(double x) { return x - Vector{}; }
-  static bool any(Mask mask) {
-    bool found = false;
-    for (int k = 0; k < W; ++k) {
-      found = found || mask[k] != 0;
+  /// One bit of each lane.
+  static unsigned bits(Mask mask) {
+#if defined(__AVX512DQ__)
+    if constexpr (W == 8) {
+      return static_cast<unsigned>(_mm512_movepi64_mask(reinterpret_cast<__m512i>(mask)));
     }
-    return found;
+#endif
+#if defined(__AVX__)
+    if constexpr (W == 4) {
+      return static_cast<unsigned>(_mm256_movemask_pd(reinterpret_cast<__m256d>(mask)));
+    }
+#endif
+#if defined(__SSE2__)
+    if constexpr (W == 2) {
+      return static_cast<unsigned>(_mm_movemask_pd(reinterpret_cast<__m128d>(mask)));
+    }
+#endif
+    unsigned result = 0;
+    for (int k = 0; k < W; ++k) {
+      result |= mask[k] != 0 ? 1U << k : 0U;
+    }
+    return result;
   }
-  static Vector magnitude(Vector v) { return v < 0.0 ? -v : v; }
+  static bool any(Mask mask) { return bits(mask) != 0; }
+  static Vector magnitude(Vector v) {
+    const auto sign = reinterpret_cast<Mask>(v) & 0x7fffffffffffffffLL;
+    return reinterpret_cast<Vector>(sign);
+  }
 
   static constexpr double kInfinity = __builtin_huge_val();
-  static constexpr std::size_t kVectors = kTile / W;
 
   static void slack(const Rows& rows, const double* x, double* out) {
     for (std::size_t i = 0; i < rows.m; i += W) {
@@ -116,20 +139,6 @@ struct Loops {
     return first_row;
   }
 
-  static double excess(const Slabs& slabs, std::size_t i, const double* centre, const double* half,
-                       const double* least) {
-    double residual = slabs.y[i], reach = 0.0, allowed = slabs.dy[i];
-    for (std::size_t j = 0; j < slabs.p; ++j) {
-      const double Y = slabs.Y[j][i];
-      residual -= Y * centre[j];
-      reach += (Y < 0.0 ? -Y : Y) * half[j];
-      if (slabs.dY != nullptr) {
-        allowed += slabs.dY[j][i] * least[j];
-      }
-    }
-    return (residual < 0.0 ? -residual : residual) + reach - allowed;
-  }
-
   static double peak(const double* column, std::size_t n, double least) {
     Vector largest = all(least);
     std::size_t i = 0;
@@ -156,170 +165,225 @@ struct Loops {
     }
   }
 
-  /// Rows i … i + W − 1: |y − Y·c| + Σ|(YT)_k| half_k.
-  static Vector oblique_reach(const Slabs& slabs, std::size_t i, const Oblique& box) {
-    const std::size_t p = slabs.p;
-    Vector residual = load(slabs.y + i), reach{};
-    for (std::size_t j = 0; j < p; ++j) {
-      residual -= load(slabs.Y[j] + i) * box.centre[j];
-    }
-    for (std::size_t k = 0; k < p; ++k) {
-      const double* column = box.transform + k * p;
-      Vector g = load(slabs.Y[0] + i) * column[0];
-      for (std::size_t j = 1; j < p; ++j) {
-        g += load(slabs.Y[j] + i) * column[j];
+  /// Rows i, i + 1, … of a column: W of them, or (not Full) the first `lanes` and zeros.
+  template <bool Full>
+  static Vector take(const double* from, std::size_t lanes) {
+    if constexpr (Full) {
+      return load(from);
+    } else {
+      Vector v{};
+      for (std::size_t k = 0; k < lanes; ++k) {
+        v[k] = from[k];
       }
-      reach += magnitude(g) * box.half[k];
+      return v;
     }
-    return magnitude(residual) + reach;
   }
 
-  static double oblique_reach_of_one(const Slabs& slabs, std::size_t i, const Oblique& box) {
-    double residual = slabs.y[i], reach = 0.0;
-    for (std::size_t j = 0; j < slabs.p; ++j) {
-      residual -= slabs.Y[j][i] * box.centre[j];
-    }
-    for (std::size_t k = 0; k < slabs.p; ++k) {
-      double g = slabs.Y[0][i] * box.transform[k * slabs.p];
-      for (std::size_t j = 1; j < slabs.p; ++j) {
-        g += slabs.Y[j][i] * box.transform[k * slabs.p + j];
+  /// A vector of rows: their columns are held where their number P is known and dY is zero; P = 0: any number, read anew.
+  template <int P, bool Full>
+  struct Group {
+    const Slabs& slabs;
+    std::size_t i, lanes;
+    Vector held[P > 0 ? P : 1];
+
+    Group(const Slabs& all, std::size_t first, std::size_t count) : slabs(all), i(first), lanes(count) {
+      for (std::size_t j = 0; P > 0 && j < P; ++j) {
+        held[j] = take<Full>(slabs.Y[j] + i, lanes);
       }
-      reach += (g < 0.0 ? -g : g) * box.half[k];
     }
-    return (residual < 0.0 ? -residual : residual) + reach;
+    [[nodiscard]] std::size_t p() const { return P > 0 ? P : slabs.p; }
+    [[nodiscard]] Vector Y(std::size_t j) const {
+      if constexpr (P > 0) {
+        return held[j];
+      } else {
+        return take<Full>(slabs.Y[j] + i, lanes);
+      }
+    }
+    [[nodiscard]] bool noisy() const { return P == 0 && slabs.dY != nullptr; }
+    [[nodiscard]] Vector dY(std::size_t j) const { return take<Full>(slabs.dY[j] + i, lanes); }
+    [[nodiscard]] Vector y() const { return take<Full>(slabs.y + i, lanes); }
+    [[nodiscard]] Vector dy() const { return take<Full>(slabs.dy + i, lanes); }
+    /// dy + Σ dY_j least_j.
+    [[nodiscard]] Vector allowed(const double* least) const {
+      Vector sum = dy();
+      for (std::size_t j = 0; noisy() && j < p(); ++j) {
+        sum += dY(j) * least[j];
+      }
+      return sum;
+    }
+    /// |y − Y·c| + Σ|(YT)_k| half_k.
+    [[nodiscard]] Vector oblique_reach(const Oblique& box) const {
+      Vector residual = y(), reach{};
+      for (std::size_t j = 0; j < p(); ++j) {
+        residual -= Y(j) * box.centre[j];
+      }
+      for (std::size_t k = 0; k < p(); ++k) {
+        const double* column = box.transform + k * p();
+        Vector g = Y(0) * column[0];
+        for (std::size_t j = 1; j < p(); ++j) {
+          g += Y(j) * column[j];
+        }
+        reach += magnitude(g) * box.half[k];
+      }
+      return magnitude(residual) + reach;
+    }
+  };
+
+  /// Calls `each(group, first, lanes)` for all rows; group() loads them.
+  template <int P, class Each>
+  static void in_groups(const Slabs& slabs, const Each& each) {
+    std::size_t first = 0;
+    for (; first + W <= slabs.n; first += W) {
+      each([&] { return Group<P, true>(slabs, first, W); }, first, W);
+    }
+    if (first < slabs.n) {
+      const std::size_t rest = slabs.n - first;
+      each([&] { return Group<P, false>(slabs, first, rest); }, first, rest);
+    }
   }
 
-  static std::size_t scan(const Slabs& slabs, const double* centre, const double* half, const double* least,
-                          const Oblique* oblique, double floor, std::uint32_t* found, double* peaks) {
-    std::size_t count = 0, first = 0;
-    for (; first + kTile <= slabs.n; first += kTile) {
-      if (peaks != nullptr && first % kStretch == 0) {
-        raise(slabs, first, slabs.n - first < kStretch ? slabs.n - first : kStretch, peaks);
-      }
-      Vector residual[kVectors], reach[kVectors];
-      for (std::size_t k = 0; k < kVectors; ++k) {
-        residual[k] = load(slabs.y + first + k * W);
-        reach[k] = Vector{};
-      }
-      for (std::size_t j = 0; j < slabs.p; ++j) {
-        const double* column = slabs.Y[j] + first;
-        const double c = centre[j], h = half[j];
-        for (std::size_t k = 0; k < kVectors; ++k) {
-          const Vector Y = load(column + k * W);
-          residual[k] -= Y * c;
-          reach[k] += magnitude(Y) * h;
-        }
-      }
-      for (std::size_t k = 0; k < kVectors; ++k) {
-        Vector allowed = load(slabs.dy + first + k * W);
-        for (std::size_t j = 0; slabs.dY != nullptr && j < slabs.p; ++j) {
-          allowed += load(slabs.dY[j] + first + k * W) * least[j];
-        }
-        const Vector e = magnitude(residual[k]) + reach[k] - allowed;
-        Mask over = ~(e <= floor);
-        if (oblique != nullptr && any(over)) {
-          over &= ~(oblique_reach(slabs, first + k * W, *oblique) - allowed <= floor);
-        }
-        if (any(over)) {
-          for (int i = 0; i < W; ++i) {
-            found[count] = static_cast<std::uint32_t>(first + k * W) + static_cast<std::uint32_t>(i);
-            count += over[i] != 0 ? 1 : 0;
-          }
-        }
-      }
+  static std::size_t report(unsigned over, std::size_t first, std::size_t lanes, std::uint32_t* found) {
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < lanes; ++k) {
+      found[count] = static_cast<std::uint32_t>(first + k);
+      count += over >> k & 1U;
     }
-    if (peaks != nullptr && first < slabs.n && first % kStretch == 0) {
-      raise(slabs, first, slabs.n - first, peaks);
-    }
-    for (; first < slabs.n; ++first) {
-      bool over = !(excess(slabs, first, centre, half, least) <= floor);
-      if (over && oblique != nullptr) {
-        double allowed = slabs.dy[first];
-        for (std::size_t j = 0; slabs.dY != nullptr && j < slabs.p; ++j) {
-          allowed += slabs.dY[j][first] * least[j];
-        }
-        over = !(oblique_reach_of_one(slabs, first, *oblique) - allowed <= floor);
+    return count;
+  }
+
+  template <int P, bool Peaks>
+  static std::size_t scan_of(const Slabs& slabs, const double* centre, const double* half, const double* least,
+                             const Oblique* oblique, double floor, std::uint32_t* found, double* peaks) {
+    std::size_t count = 0;
+    Vector top[P + 1] = {};
+    in_groups<P>(slabs, [&](const auto& group, std::size_t first, std::size_t lanes) {
+      const auto rows = group();
+      if (Peaks && P == 0 && first % kStretch == 0) {
+        const std::size_t left = slabs.n - first;
+        raise(slabs, first, left < kStretch ? left : kStretch, peaks);
       }
-      if (over) {
-        found[count++] = static_cast<std::uint32_t>(first);
+      Vector residual = rows.y(), reach{};
+      if constexpr (Peaks && P > 0) {
+        const Vector y = magnitude(residual);
+        top[P] = y > top[P] ? y : top[P];
+      }
+      for (std::size_t j = 0; j < rows.p(); ++j) {
+        const Vector Y = rows.Y(j), size = magnitude(Y);
+        residual -= Y * centre[j];
+        reach += size * half[j];
+        if constexpr (Peaks && P > 0) {
+          top[j] = size > top[j] ? size : top[j];
+        }
+      }
+      const Vector allowed = rows.allowed(least);
+      Mask over = ~(magnitude(residual) + reach - allowed <= floor);
+      if (oblique != nullptr && any(over)) {
+        over &= ~(rows.oblique_reach(*oblique) - allowed <= floor);
+      }
+      if (any(over)) {
+        count += report(bits(over), first, lanes, found + count);
+      }
+    });
+    for (std::size_t j = 0; Peaks && P > 0 && j <= P; ++j) {
+      for (int k = 0; k < W; ++k) {
+        peaks[j] = top[j][k] > peaks[j] ? top[j][k] : peaks[j];
       }
     }
     return count;
   }
 
-  static constexpr std::size_t kMostColumns = 32;
-
-  /// Rows i … i + W − 1: whether one of the points exceeds what is allowed, or is not a number.
-  static Mask exceeded(const Slabs& slabs, std::size_t i, const double* points, std::size_t count) {
-    const std::size_t p = slabs.p;
-    Vector Y[kMostColumns];
-    for (std::size_t j = 0; j < p; ++j) {
-      Y[j] = load(slabs.Y[j] + i);
+  template <int P>
+  static std::size_t examine_of(const Slabs& slabs, const Points& at, std::uint32_t* found, unsigned char* open,
+                                double* most) {
+    std::size_t count = 0;
+    Vector largest = all(most != nullptr ? *most : 0.0);
+    bool any_of_lanes = false;
+    in_groups<P>(slabs, [&](const auto& group, std::size_t first, std::size_t lanes) {
+      if (open != nullptr && open[first / kLanes] == 0) {
+        return;
+      }
+      const auto rows = group();
+      Vector residual = rows.y(), reach{};
+      for (std::size_t j = 0; j < rows.p(); ++j) {
+        const Vector Y = rows.Y(j);
+        residual -= Y * at.centre[j];
+        reach += magnitude(Y) * at.half[j];
+      }
+      const Vector least = rows.allowed(at.least);
+      const Mask beyond = ~(magnitude(residual) + reach <= least);
+      const bool matters = any(beyond);
+      any_of_lanes = (first % kLanes != 0 && any_of_lanes) || matters;
+      if (open != nullptr && ((first + W) % kLanes == 0 || lanes < W)) {
+        open[first / kLanes] = any_of_lanes ? 1 : 0;
+      }
+      if (!matters) {
+        return;
+      }
+      for (std::size_t j = 0; rows.noisy() && j < rows.p(); ++j) {
+        reach += rows.dY(j) * at.half[j];
+      }
+      const Vector ratio = reach / least;
+      largest = beyond & (ratio > largest) ? ratio : largest;
+      Mask over{};
+      const Vector y = rows.y(), dy = rows.dy();
+      const auto hold = [&](const double* x, Vector e) {
+        Vector allowed = dy;
+        for (std::size_t j = 0; rows.noisy() && j < rows.p(); ++j) {
+          allowed += rows.dY(j) * (x[j] < 0.0 ? -x[j] : x[j]);
+        }
+        over |= ~(magnitude(e) <= allowed * at.share);
+      };
+      for (std::size_t k = 0; k < at.count; k += 2) {
+        const double* x = at.points + k * rows.p();
+        const double* z = k + 1 < at.count ? x + rows.p() : x;
+        Vector e = y, f = y;
+        for (std::size_t j = 0; j < rows.p(); ++j) {
+          const Vector Y = rows.Y(j);
+          e -= Y * x[j];
+          f -= Y * z[j];
+        }
+        hold(x, e);
+        hold(z, f);
+      }
+      over &= beyond;
+      if (any(over)) {
+        count += report(bits(over), first, lanes, found + count);
+      }
+    });
+    for (int k = 0; most != nullptr && k < W; ++k) {
+      *most = largest[k] > *most ? largest[k] : *most;
     }
-    const Vector y = load(slabs.y + i), dy = load(slabs.dy + i);
-    Mask over{};
-    for (std::size_t k = 0; k < count; ++k) {
-      const double* x = points + k * p;
-      Vector even = y - Y[0] * x[0], odd{};
-      for (std::size_t j = 1; j + 1 < p; j += 2) {
-        odd -= Y[j] * x[j];
-        even -= Y[j + 1] * x[j + 1];
-      }
-      if (p % 2 == 0) {
-        odd -= Y[p - 1] * x[p - 1];
-      }
-      Vector excess = magnitude(even + odd) - dy;
-      for (std::size_t j = 0; slabs.dY != nullptr && j < p; ++j) {
-        excess -= load(slabs.dY[j] + i) * (x[j] < 0.0 ? -x[j] : x[j]);
-      }
-      over |= ~(excess <= 0.0);
-    }
-    return over;
+    return count;
   }
 
-  static std::size_t violated(const Slabs& slabs, const double* points, std::size_t count, std::uint32_t* found) {
-    std::size_t total = 0, i = 0;
-    const auto report = [&](std::size_t first, Mask over) {
-      for (int k = 0; any(over) && k < W; ++k) {
-        found[total] = static_cast<std::uint32_t>(first) + static_cast<std::uint32_t>(k);
-        total += over[k] != 0 ? 1 : 0;
-      }
-    };
-    for (; i + W <= slabs.n; i += W) {
-      report(i, exceeded(slabs, i, points, count));
-    }
-    for (; i < slabs.n; ++i) {
-      double Y[kMostColumns], dY[kMostColumns];
-      for (std::size_t j = 0; j < slabs.p; ++j) {
-        Y[j] = slabs.Y[j][i];
-        dY[j] = slabs.dY != nullptr ? slabs.dY[j][i] : 0.0;
-      }
-      bool over = false;
-      for (std::size_t k = 0; k < count; ++k) {
-        const double* x = points + k * slabs.p;
-        double even = slabs.y[i] - Y[0] * x[0], odd = 0.0;
-        for (std::size_t j = 1; j + 1 < slabs.p; j += 2) {
-          odd -= Y[j] * x[j];
-          even -= Y[j + 1] * x[j + 1];
-        }
-        if (slabs.p % 2 == 0) {
-          odd -= Y[slabs.p - 1] * x[slabs.p - 1];
-        }
-        double excess = (even + odd < 0.0 ? -(even + odd) : even + odd) - slabs.dy[i];
-        for (std::size_t j = 0; slabs.dY != nullptr && j < slabs.p; ++j) {
-          excess -= dY[j] * (x[j] < 0.0 ? -x[j] : x[j]);
-        }
-        over = over || !(excess <= 0.0);
-      }
-      if (over) {
-        found[total++] = static_cast<std::uint32_t>(i);
+  /// Up to how many columns the loops are compiled for their number.
+  static constexpr int kFixed = 12;
+
+  template <int P>
+  static std::size_t scan_with(const Slabs& slabs, const double* centre, const double* half, const double* least,
+                               const Oblique* oblique, double floor, std::uint32_t* found, double* peaks) {
+    if constexpr (P > 0) {
+      if (slabs.p != P || slabs.dY != nullptr) {
+        return scan_with<P - 1>(slabs, centre, half, least, oblique, floor, found, peaks);
       }
     }
-    return total;
+    return peaks != nullptr ? scan_of<P, true>(slabs, centre, half, least, oblique, floor, found, peaks)
+                            : scan_of<P, false>(slabs, centre, half, least, oblique, floor, found, peaks);
+  }
+
+  template <int P>
+  static std::size_t examine_with(const Slabs& slabs, const Points& at, std::uint32_t* found,
+                                  unsigned char* open, double* most) {
+    if constexpr (P > 0) {
+      if (slabs.p != P || slabs.dY != nullptr) {
+        return examine_with<P - 1>(slabs, at, found, open, most);
+      }
+    }
+    return examine_of<P>(slabs, at, found, open, most);
   }
 
   static constexpr Table table(const char* name) {
-    return {name, &slack, &most_violated, &first_blocking, &scan, &violated};
+    return {name, &slack, &most_violated, &first_blocking, &scan_with<kFixed>, &examine_with<kFixed>};
   }
 };
 

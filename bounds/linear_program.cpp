@@ -24,6 +24,7 @@ constexpr std::size_t kRefactor = 24;  // exchanges after which the inverse is m
 constexpr double kAccurate = 1e-13;    // residual of the basis' equations that needs no fresh inverse
 constexpr double kRounding = 4.0;      // violations of rows over that of a row of the basis, both by rounding
 constexpr double kCoarse = 1e-3;       // of the optimum, what that must not come to
+constexpr std::size_t kSeen = 32;      // vertices to begin at
 constexpr double kOnBox = 1e-9;        // multiplier of a side of the box that matters
 
 }  // namespace
@@ -32,8 +33,7 @@ LinearProgram::LinearProgram(Eigen::VectorXd lower, Eigen::VectorXd upper)
     : p_(static_cast<std::size_t>(lower.size())),
       lower_(lower.data(), lower.data() + lower.size()),
       upper_(upper.data(), upper.data() + upper.size()),
-      basis_(p_),
-      inverse_(p_ * p_),
+      basis_{std::vector<int>(p_), std::vector<double>(p_ * p_), 0},
       x_(p_),
       lambda_(p_),
       row_(p_),
@@ -61,6 +61,18 @@ kernels::Rows LinearProgram::view() const {
   return {a_.data(), stride_, padded, p_, b_.data()};
 }
 
+double LinearProgram::violation(std::size_t first, const double* x) const {
+  double worst = -kInfinity;
+  for (std::size_t i = first; i < count_; ++i) {
+    double excess = -b_[i];
+    for (std::size_t j = 0; j < p_; ++j) {
+      excess += a_[j * stride_ + i] * x[j];
+    }
+    worst = std::max(worst, excess);
+  }
+  return worst;
+}
+
 void LinearProgram::add_rows(const Eigen::MatrixXd& a_columns, const Eigen::VectorXd& b) {
   const auto added = static_cast<std::size_t>(b.size());
   if (count_ + added > stride_) {
@@ -83,13 +95,24 @@ void LinearProgram::add_rows(const Eigen::MatrixXd& a_columns, const Eigen::Vect
     }
     b_[count_ + k] = b[static_cast<Eigen::Index>(k)];
   }
+  for (std::size_t k = 0; k < seen_.size(); ++k) {
+    for (std::size_t i = count_; i < count_ + added && !seen_[k].rows.empty(); ++i) {
+      double excess = -b_[i];
+      for (std::size_t j = 0; j < p_; ++j) {
+        excess += a_[j * stride_ + i] * seen_x_[j * kSeen + k];
+      }
+      if (excess > kFeasible) {
+        seen_[k].rows.clear();
+      }
+    }
+  }
   count_ += added;
   settled_ = false;
 }
 
 void LinearProgram::corner(const double* c) {
   for (std::size_t j = 0; j < p_; ++j) {
-    basis_[j] = -1 - static_cast<int>(2 * j + (c[j] > 0.0 ? 1 : 0));
+    basis_.rows[j] = -1 - static_cast<int>(2 * j + (c[j] > 0.0 ? 1 : 0));
   }
   factored_ = false;
 }
@@ -99,24 +122,24 @@ bool LinearProgram::refactor() {
   Eigen::MatrixXd rows(p, p);
   for (std::size_t r = 0; r < p_; ++r) {
     for (std::size_t j = 0; j < p_; ++j) {
-      rows(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(j)) = coefficient(basis_[r], j);
+      rows(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(j)) = coefficient(basis_.rows[r], j);
     }
   }
-  Eigen::Map<Eigen::MatrixXd> inverse(inverse_.data(), p, p);
+  Eigen::Map<Eigen::MatrixXd> inverse(basis_.inverse.data(), p, p);
   inverse = core::LuFactors(rows).inverse();
   // One step of Newton's iteration halves the digits that are missing.
   inverse += inverse * (Eigen::MatrixXd::Identity(p, p) - rows * inverse);
   factored_ = inverse.allFinite() && inverse.cwiseAbs().maxCoeff() < 1e13;
-  since_factored_ = 0;
+  basis_.age = 0;
   return factored_;
 }
 
 void LinearProgram::place() {
   std::fill(x_.begin(), x_.end(), 0.0);
   for (std::size_t r = 0; r < p_; ++r) {
-    const double b = bound(basis_[r]);
+    const double b = bound(basis_.rows[r]);
     for (std::size_t j = 0; j < p_; ++j) {
-      x_[j] += inverse_[r * p_ + j] * b;
+      x_[j] += basis_.inverse[r * p_ + j] * b;
     }
   }
 }
@@ -125,7 +148,7 @@ void LinearProgram::price(const double* c) {
   for (std::size_t r = 0; r < p_; ++r) {
     double sum = 0.0;
     for (std::size_t j = 0; j < p_; ++j) {
-      sum += inverse_[r * p_ + j] * c[j];
+      sum += basis_.inverse[r * p_ + j] * c[j];
     }
     lambda_[r] = sum;
   }
@@ -151,14 +174,14 @@ bool LinearProgram::accurate(const double* c) const {
   for (std::size_t j = 0; j < p_; ++j) {
     double rest = c[j];
     for (std::size_t r = 0; r < p_; ++r) {
-      rest -= lambda_[r] * coefficient(basis_[r], j);
+      rest -= lambda_[r] * coefficient(basis_.rows[r], j);
     }
     worst = std::max(worst, std::abs(rest));
   }
   for (std::size_t r = 0; r < p_; ++r) {
-    double rest = bound(basis_[r]);
+    double rest = bound(basis_.rows[r]);
     for (std::size_t j = 0; j < p_; ++j) {
-      rest -= coefficient(basis_[r], j) * x_[j];
+      rest -= coefficient(basis_.rows[r], j) * x_[j];
     }
     worst = std::max(worst, std::abs(rest));
   }
@@ -183,21 +206,21 @@ bool LinearProgram::inside() {
 
 /// Puts `entering` in the place of basis row `leaving`; alpha = Zᵀ a of the entering row.
 void LinearProgram::exchange(std::size_t leaving, int entering, const double* alpha) {
-  double* edge = inverse_.data() + leaving * p_;
+  double* edge = basis_.inverse.data() + leaving * p_;
   const double pivot = 1.0 / alpha[leaving];
   for (std::size_t j = 0; j < p_; ++j) {
     edge[j] *= pivot;
   }
   for (std::size_t r = 0; r < p_; ++r) {
     if (r != leaving) {
-      double* other = inverse_.data() + r * p_;
+      double* other = basis_.inverse.data() + r * p_;
       for (std::size_t j = 0; j < p_; ++j) {
         other[j] -= alpha[r] * edge[j];
       }
     }
   }
-  basis_[leaving] = entering;
-  ++since_factored_;
+  basis_.rows[leaving] = entering;
+  ++basis_.age;
 }
 
 LinearProgram::Outcome LinearProgram::dual(const double* c) {
@@ -206,7 +229,7 @@ LinearProgram::Outcome LinearProgram::dual(const double* c) {
   slack_known_ = false;
   double feasible = kFeasible;
   for (std::size_t step = 0; step < 400 + 40 * p_; ++step) {
-    if (since_factored_ >= kRefactor && !renew(c)) {
+    if (basis_.age >= kRefactor && !renew(c)) {
       return Outcome::stuck;
     }
     int entering = 0;
@@ -239,10 +262,10 @@ LinearProgram::Outcome LinearProgram::dual(const double* c) {
     if (!(violation > feasible)) {
       return Outcome::optimal;
     }
-    if (std::find(basis_.begin(), basis_.end(), entering) != basis_.end()) {
+    if (std::find(basis_.rows.begin(), basis_.rows.end(), entering) != basis_.rows.end()) {
       // A row of the basis is met but for rounding: what it shows of that, no row can be better than.
-      if (since_factored_ > 0) {
-        since_factored_ = kRefactor;
+      if (basis_.age > 0) {
+        basis_.age = kRefactor;
         continue;
       }
       feasible = kRounding * violation;
@@ -260,7 +283,7 @@ LinearProgram::Outcome LinearProgram::dual(const double* c) {
     for (std::size_t r = 0; r < p_; ++r) {
       double sum = 0.0;
       for (std::size_t j = 0; j < p_; ++j) {
-        sum += inverse_[r * p_ + j] * row_[j];
+        sum += basis_.inverse[r * p_ + j] * row_[j];
       }
       alpha_[r] = sum;
       if (sum > kPivot) {
@@ -268,8 +291,8 @@ LinearProgram::Outcome LinearProgram::dual(const double* c) {
       }
     }
     if (least == kInfinity) {
-      if (since_factored_ > 0) {
-        since_factored_ = kRefactor;
+      if (basis_.age > 0) {
+        basis_.age = kRefactor;
         continue;
       }
       return Outcome::infeasible;
@@ -278,12 +301,12 @@ LinearProgram::Outcome LinearProgram::dual(const double* c) {
     const double tie = least * (1.0 + 1e-14) + 1e-14;
     for (std::size_t r = 0; r < p_; ++r) {
       if (alpha_[r] > kPivot && std::max(lambda_[r], 0.0) <= tie * alpha_[r] &&
-          (leaving == p_ || (bland ? basis_[r] < basis_[leaving] : alpha_[r] > alpha_[leaving]))) {
+          (leaving == p_ || (bland ? basis_.rows[r] < basis_.rows[leaving] : alpha_[r] > alpha_[leaving]))) {
         leaving = r;
       }
     }
-    if (alpha_[leaving] < kGoodPivot && since_factored_ > 0) {
-      since_factored_ = kRefactor;
+    if (alpha_[leaving] < kGoodPivot && basis_.age > 0) {
+      basis_.age = kRefactor;
       continue;
     }
     still = least * violation > 1e-15 ? 0 : still + 1;
@@ -297,7 +320,7 @@ LinearProgram::Outcome LinearProgram::dual(const double* c) {
       gap -= row_[j] * x_[j];
     }
     for (std::size_t j = 0; j < p_; ++j) {
-      x_[j] += inverse_[leaving * p_ + j] * gap;
+      x_[j] += basis_.inverse[leaving * p_ + j] * gap;
     }
   }
   return Outcome::stuck;
@@ -307,7 +330,7 @@ LinearProgram::Outcome LinearProgram::primal(const double* c) {
   bool bland = careful_;
   std::size_t still = 0;
   for (std::size_t step = 0; step < 400 + 40 * p_; ++step) {
-    if (since_factored_ >= kRefactor) {
+    if (basis_.age >= kRefactor) {
       if (!renew(c)) {
         return Outcome::stuck;
       }
@@ -328,10 +351,10 @@ LinearProgram::Outcome LinearProgram::primal(const double* c) {
       if (lambda_[r] < -kPriced) {
         double norm = 0.0;
         for (std::size_t j = 0; j < p_; ++j) {
-          norm += inverse_[r * p_ + j] * inverse_[r * p_ + j];
+          norm += basis_.inverse[r * p_ + j] * basis_.inverse[r * p_ + j];
         }
         const double rate = lambda_[r] / std::sqrt(norm);
-        if (leaving == p_ || (bland ? basis_[r] < basis_[leaving] : rate < steepest)) {
+        if (leaving == p_ || (bland ? basis_.rows[r] < basis_.rows[leaving] : rate < steepest)) {
           steepest = rate;
           leaving = r;
         }
@@ -341,7 +364,7 @@ LinearProgram::Outcome LinearProgram::primal(const double* c) {
       return Outcome::optimal;
     }
     for (std::size_t j = 0; j < p_; ++j) {
-      direction_[j] = -inverse_[leaving * p_ + j];
+      direction_[j] = -basis_.inverse[leaving * p_ + j];
     }
     double furthest = kInfinity, pivot = 0.0;
     int entering = 0;
@@ -376,11 +399,11 @@ LinearProgram::Outcome LinearProgram::primal(const double* c) {
         offer(-1 - static_cast<int>(2 * j + (d > 0.0 ? 1 : 0)), std::max(room, 0.0) / std::abs(d), std::abs(d));
       }
     }
-    if (furthest == kInfinity || (pivot < kGoodPivot && since_factored_ > 0)) {
-      if (since_factored_ == 0) {
+    if (furthest == kInfinity || (pivot < kGoodPivot && basis_.age > 0)) {
+      if (basis_.age == 0) {
         return Outcome::stuck;
       }
-      since_factored_ = kRefactor;
+      basis_.age = kRefactor;
       continue;
     }
     still = -lambda_[leaving] * furthest > 1e-15 ? 0 : still + 1;
@@ -388,7 +411,7 @@ LinearProgram::Outcome LinearProgram::primal(const double* c) {
     for (std::size_t r = 0; r < p_; ++r) {
       double sum = 0.0;
       for (std::size_t j = 0; j < p_; ++j) {
-        sum += inverse_[r * p_ + j] * coefficient(entering, j);
+        sum += basis_.inverse[r * p_ + j] * coefficient(entering, j);
       }
       alpha_[r] = sum;
     }
@@ -430,7 +453,7 @@ LinearProgram::Outcome LinearProgram::solve(const double* c) {
       outcome = primal(c);
     }
     settled_ = outcome == Outcome::optimal;
-    if (outcome != Outcome::optimal || since_factored_ == 0 || accurate(c)) {
+    if (outcome != Outcome::optimal || basis_.age == 0 || accurate(c)) {
       return outcome;
     }
     // What a long walk has rounded is made afresh, and looked at once more.
@@ -450,12 +473,12 @@ LpSolution LinearProgram::report(const Eigen::VectorXd& c, double norm) {
   result.status = LpSolution::Status::optimal;
   std::vector<double> positive;
   for (std::size_t r = 0; r < p_; ++r) {
-    if (basis_[r] < 0) {
+    if (basis_.rows[r] < 0) {
       if (lambda_[r] > kOnBox) {
         result.status = LpSolution::Status::failed;
       }
     } else if (lambda_[r] > 0.0) {
-      result.rows.push_back(basis_[r]);
+      result.rows.push_back(basis_.rows[r]);
       positive.push_back(lambda_[r] * norm);
     }
   }
@@ -479,17 +502,60 @@ LinearProgram::Outcome LinearProgram::solve_cold(const double* c) {
   return outcome;
 }
 
+/// Goes to the best of the vertices seen, if it is better than where the program stands.
+void LinearProgram::recall(const double* c) {
+  double value[kSeen] = {}, here = 0.0;
+  for (std::size_t j = 0; j < p_; ++j) {
+    here += c[j] * x_[j];
+    for (std::size_t k = 0; k < kSeen; ++k) {
+      value[k] += c[j] * seen_x_[j * kSeen + k];
+    }
+  }
+  std::size_t best = kSeen;
+  for (std::size_t k = 0; k < kSeen; ++k) {
+    if (!seen_[k].rows.empty() && value[k] > here + kPriced) {
+      here = value[k];
+      best = k;
+    }
+  }
+  if (best < kSeen) {
+    basis_ = seen_[best];
+    for (std::size_t j = 0; j < p_; ++j) {
+      x_[j] = seen_x_[j * kSeen + best];
+    }
+    slack_known_ = false;
+  }
+}
+
+void LinearProgram::remember() {
+  seen_[next_seen_] = basis_;
+  for (std::size_t j = 0; j < p_; ++j) {
+    seen_x_[j * kSeen + next_seen_] = x_[j];
+  }
+  next_seen_ = (next_seen_ + 1) % kSeen;
+}
+
 std::optional<double> LinearProgram::reach(const double* c, double enough) {
   Outcome outcome = Outcome::stuck;
   enough_ = enough;
+  if (seen_.empty()) {
+    seen_.resize(kSeen);
+    seen_x_.resize(kSeen * p_);
+  }
+  bool walked = true;
   if (factored_) {
     if (settled_) {
+      recall(c);
       price(c);
     }
-    outcome = settled_ && priced() ? Outcome::optimal : solve(c);
+    walked = !(settled_ && priced());
+    outcome = walked ? solve(c) : Outcome::optimal;
   }
   if (outcome != Outcome::optimal) {
     outcome = solve_cold(c);
+  }
+  if (walked && outcome == Outcome::optimal) {
+    remember();
   }
   enough_ = kInfinity;
   if (outcome != Outcome::optimal) {
@@ -515,10 +581,14 @@ LpSolution LinearProgram::maximise(const Eigen::VectorXd& c, Basis& start) {
   const Eigen::VectorXd unit = c / norm;
   const double* direction = unit.data();
   Outcome outcome = Outcome::stuck;
-  if (!start.empty()) {
-    if (start != basis_ || !factored_) {
-      basis_ = start;
-      factored_ = false;
+  if (!start.rows.empty()) {
+    if (start.rows != basis_.rows || !factored_) {
+      factored_ = !start.inverse.empty();
+      basis_.rows = start.rows;
+      if (factored_) {
+        basis_ = start;
+      }
+      settled_ = false;
     }
     outcome = solve(direction);
   }

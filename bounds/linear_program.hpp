@@ -39,8 +39,12 @@ struct LpSolution {
 /// corner is where a cold start begins, and an optimum on its sides is reported as `failed`.
 class LinearProgram {
  public:
-  /// Rows of a vertex: numbers of rows, or negative ones for sides of the box. Empty: no start known.
-  using Basis = std::vector<int>;
+  /// A vertex to start from.
+  struct Basis {
+    std::vector<int> rows;        ///< numbers of rows, or negative ones for sides of the box; none: no start known
+    std::vector<double> inverse;  ///< as the program held it, p × p; none: it is made from `rows`
+    std::size_t age = 0;          ///< exchanges since `inverse` was made afresh
+  };
 
   /// A program without rows on lower <= x <= upper, both finite.
   LinearProgram(Eigen::VectorXd lower, Eigen::VectorXd upper);
@@ -50,14 +54,19 @@ class LinearProgram {
   /// The rows, padded, for the loops of kernels.hpp.
   [[nodiscard]] kernels::Rows view() const;
 
+  /// The largest a·x − b of the rows from `first` on; −infinity where there are none. `x`: as many numbers as variables.
+  [[nodiscard]] double violation(std::size_t first, const double* x) const;
+
   /// Solves max c·x, starting from the vertex of the last solve.
   [[nodiscard]] LpSolution maximise(const Eigen::VectorXd& c);
-  /// Solves max c·x, starting from the basis `start` where it is not empty; writes the optimal basis to it.
+  /// Solves max c·x, starting from the basis `start` where it has rows; writes the optimal basis to it. An inverse must
+  /// come from this program, or one with the same rows.
   [[nodiscard]] LpSolution maximise(const Eigen::VectorXd& c, Basis& start);
 
   /// max c·x for a direction of norm one (`c`: as many numbers as variables), starting from the vertex of the last
-  /// solve; the walk may end as soon as c·x exceeds `enough`. Nothing where the program fails. Where the last vertex is
-  /// still the best, this costs p² products; nothing is allocated.
+  /// solve or, where it is better, from one of the vertices that earlier calls ended in; the walk may end as soon as c·x
+  /// exceeds `enough`. Nothing where the program fails. Where no vertex is better than those, this costs some p² products;
+  /// nothing is allocated but in the first calls.
   [[nodiscard]] std::optional<double> reach(const double* c, double enough);
   /// The vertex of the last solve, p numbers.
   [[nodiscard]] const double* vertex() const { return x_.data(); }
@@ -81,20 +90,23 @@ class LinearProgram {
   Outcome solve(const double* c);
   Outcome solve_cold(const double* c);
   LpSolution report(const Eigen::VectorXd& c, double norm);
+  void recall(const double* c);
+  void remember();
 
   std::size_t p_;
   std::vector<double> lower_, upper_;
   std::vector<double> a_, b_;
   std::size_t count_ = 0, stride_ = 0;
-  std::vector<int> basis_;
-  std::vector<double> inverse_;  // column r is the edge along which only row r of the basis is left
+  Basis basis_;                  // .inverse: column r is the edge along which only row r of the basis is left
   std::vector<double> x_, lambda_, slack_, along_, row_, alpha_, direction_;
   bool factored_ = false;
   bool settled_ = false;      // x_ satisfies all rows
   bool slack_known_ = false;  // slack_ is that of x_
   bool careful_ = false;
+  std::vector<Basis> seen_;     // bases of vertices that reach() ended in, which satisfy all rows
+  std::vector<double> seen_x_;  // their vertices, by columns
+  std::size_t next_seen_ = 0;   // the place of the next one
   double enough_ = std::numeric_limits<double>::infinity();  // for a direction of norm one
-  std::size_t since_factored_ = 0;
 };
 
 }  // namespace wheelwright::bounds

@@ -319,7 +319,7 @@ double certified_support(const Polytope::Block& block, const Eigen::VectorXd& a,
   }
   at = block.coordinates.centre + block.coordinates.transform * solution.x;
   std::vector<const HalfSpace*> vertex;
-  for (const int i : basis) {
+  for (const int i : basis.rows) {
     if (i >= 0) {
       vertex.push_back(&block.facets[static_cast<std::size_t>(i)]);
     }

@@ -143,10 +143,10 @@ bool SupportWalk::begin(Walk& walk, const Polytope::Block& block, const SupportW
   program.add_rows(normals, offsets);
   LinearProgram::Basis basis;
   if (program.maximise(Eigen::VectorXd::Ones(n), basis).status != LpSolution::Status::optimal ||
-      std::any_of(basis.begin(), basis.end(), [](int row) { return row < 0; })) {
+      std::any_of(basis.rows.begin(), basis.rows.end(), [](int row) { return row < 0; })) {
     return false;
   }
-  walk.places.assign(options.slots, {0, 0, {basis.begin(), basis.end()}});
+  walk.places.assign(options.slots, {0, 0, {basis.rows.begin(), basis.rows.end()}});
   return make(walk, walk.places.front().basis.data(), nullptr);
 }
 

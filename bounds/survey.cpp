@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kRun = 8;
 constexpr std::size_t kRuns = 2048;
+constexpr Eigen::Index kMany = 512;  // rows of a product
 
 }  // namespace
 
@@ -44,7 +45,7 @@ SpreadSample::SpreadSample(const SlabColumns& rows) {
     }
   }
   const std::size_t n = picked.size(), columns = p + rows.dY.size() + 2;
-  memory_.resize(n * columns);
+  memory_ = std::make_unique_for_overwrite<double[]>(n * columns);
   const auto gather = [&](std::size_t column, const double* from) {
     for (std::size_t i = 0; i < n; ++i) {
       memory_[column * n + i] = from[picked[i]];
@@ -54,16 +55,16 @@ SpreadSample::SpreadSample(const SlabColumns& rows) {
   all.n = n;
   for (std::size_t j = 0; j < p; ++j) {
     gather(j, rows.Y[j]);
-    all.Y[j] = memory_.data() + j * n;
+    all.Y[j] = memory_.get() + j * n;
   }
   for (std::size_t j = 0; j < rows.dY.size(); ++j) {
     gather(p + j, rows.dY[j]);
-    all.dY[j] = memory_.data() + (p + j) * n;
+    all.dY[j] = memory_.get() + (p + j) * n;
   }
   gather(columns - 2, rows.y);
   gather(columns - 1, rows.dy);
-  all.y = memory_.data() + (columns - 2) * n;
-  all.dy = memory_.data() + (columns - 1) * n;
+  all.y = memory_.get() + (columns - 2) * n;
+  all.dy = memory_.get() + (columns - 1) * n;
   for (const std::size_t i : picked) {
     const RowOrigin origin = rows.origin(i);
     samples_.push_back(origin.sample);
@@ -86,7 +87,7 @@ Eigen::VectorXd SpreadSample::weights(const Box& prior) const {
     const Interval& side = prior.sides[static_cast<std::size_t>(j)];
     reach[j] = std::max(std::abs(side.lower), std::abs(side.upper));
   }
-  const Eigen::Map<const Eigen::MatrixXd> Y(memory_.data(), n, p);
+  const Eigen::Map<const Eigen::MatrixXd> Y(memory_.get(), n, p);
   Eigen::VectorXd width = Eigen::Map<const Eigen::VectorXd>(rows.dy, n);
   for (std::size_t j = 0; j < rows.dY.size(); ++j) {
     width += Eigen::Map<const Eigen::VectorXd>(rows.dY[j], n) * reach[static_cast<Eigen::Index>(j)];
@@ -96,15 +97,22 @@ Eigen::VectorXd SpreadSample::weights(const Box& prior) const {
 
 Eigen::MatrixXd SpreadSample::information(const Box& prior) const {
   const auto p = static_cast<Eigen::Index>(all().parameters());
-  const Eigen::Map<const Eigen::MatrixXd> Y(memory_.data(), static_cast<Eigen::Index>(all().n), p);
-  const Eigen::MatrixXd weighted = weights(prior).asDiagonal() * Y;
-  return weighted.transpose() * weighted;
+  const auto n = static_cast<Eigen::Index>(all().n);
+  const Eigen::Map<const Eigen::MatrixXd> Y(memory_.get(), n, p);
+  const Eigen::VectorXd weight = weights(prior);
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(p, p), some;
+  for (Eigen::Index first = 0; first < n; first += kMany) {
+    const Eigen::Index count = std::min<Eigen::Index>(kMany, n - first);
+    some = weight.segment(first, count).asDiagonal() * Y.middleRows(first, count);
+    sum.noalias() += some.transpose() * some;
+  }
+  return sum;
 }
 
 Eigen::VectorXd SpreadSample::estimate(const Box& prior) const {
   const auto p = static_cast<Eigen::Index>(all().parameters());
   const auto n = static_cast<Eigen::Index>(all().n);
-  const Eigen::Map<const Eigen::MatrixXd> Y(memory_.data(), n, p);
+  const Eigen::Map<const Eigen::MatrixXd> Y(memory_.get(), n, p);
   const Eigen::VectorXd weight = weights(prior).cwiseAbs2();
   const Coordinates at = whitened(prior, information(prior));
   const Eigen::VectorXd rest = Eigen::Map<const Eigen::VectorXd>(all().y, n) - Y * at.centre;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include <wheelwright/bounds/box.hpp>
@@ -30,7 +31,7 @@ class SpreadSample {
  private:
   [[nodiscard]] Eigen::VectorXd weights(const Box& prior) const;
 
-  std::vector<double> memory_;
+  std::unique_ptr<double[]> memory_;
   std::vector<std::size_t> samples_;
   std::vector<double> times_;
   std::vector<SlabColumns> levels_;

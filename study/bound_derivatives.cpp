@@ -73,13 +73,13 @@ void locate(const HullOptima& optima, HullOptimum& optimum) {
   program.add_rows(block.normals, block.offsets);
   bounds::LinearProgram::Basis basis;
   if (program.maximise(c / c.norm(), basis).status != bounds::LpSolution::Status::optimal ||
-      std::ranges::any_of(basis, [](int row) { return row < 0; })) {
+      std::ranges::any_of(basis.rows, [](int row) { return row < 0; })) {
     return;
   }
   Eigen::MatrixXd rows(c.size(), c.size());
   Eigen::VectorXd offsets(c.size());
   for (Eigen::Index r = 0; r < c.size(); ++r) {
-    const int facet = basis[static_cast<std::size_t>(r)];
+    const int facet = basis.rows[static_cast<std::size_t>(r)];
     rows.row(r) = block.normals.col(facet).transpose();
     offsets[r] = block.offsets[facet];
   }
@@ -92,7 +92,7 @@ void locate(const HullOptima& optima, HullOptimum& optimum) {
   Eigen::VectorXd theta = block.coordinates.centre + block.coordinates.transform * lu.solve(offsets);
   // Once more with the residuals of the rows themselves.
   for (Eigen::Index r = 0; r < c.size(); ++r) {
-    const auto facet = static_cast<std::size_t>(basis[static_cast<std::size_t>(r)]);
+    const auto facet = static_cast<std::size_t>(basis.rows[static_cast<std::size_t>(r)]);
     const HalfSpace& row = block.facets[facet];
     const double norm = block.norms[static_cast<Eigen::Index>(facet)];
     offsets[r] = (row.b - row.a.dot(theta)) / norm;

@@ -115,16 +115,40 @@ TEST(IntervalHull, DoesNotDependOnThreadsOrBlocks) {
 // With little room for rows that matter, more passes give the same hull.
 TEST(IntervalHull, TakesMorePassesWhereThereIsLittleRoom) {
   const Rows rows = slow_rows(6, 4, 300000, false, 0.2);
-  core::RegressionTable table = rows.table();
-  const Columns columns(table.block());
+  BlockSource source(rows, 5000);
   IntervalHullOptions little;
   little.most_rows = 64;
-  const IntervalHull tight = interval_hull(columns.view, positive(4)),
-                     same = interval_hull(columns.view, positive(4), little);
-  EXPECT_GT(same.passes, 1u);
+  const IntervalHull tight = interval_hull(source, positive(4)), same = interval_hull(source, positive(4), little);
+  EXPECT_GT(same.passes, tight.passes);
   for (std::size_t j = 0; j < 4; ++j) {
     EXPECT_NEAR(same.hull.sides[j].lower, tight.hull.sides[j].lower, 1e-9 * tight.hull.sides[j].width());
     EXPECT_NEAR(same.hull.sides[j].upper, tight.hull.sides[j].upper, 1e-9 * tight.hull.sides[j].width());
+  }
+}
+
+// Rows that look settled by what came early: a corner that each portion moves, and a row beyond it at the very beginning.
+TEST(IntervalHull, RowsOfTheBeginningAreHeldAgainstTheCornersOfTheEnd) {
+  for (const bool noisy : {false, true}) {
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      Random random(seed);
+      const std::size_t n = 200000, p = 3;
+      Rows rows(p);
+      for (std::size_t k = 0; k < n; ++k) {
+        // Late rows are the narrow ones, so that the hull shrinks to the end, and turn slowly.
+        const double width = 1.0 + 50.0 * (1.0 - static_cast<double>(k) / n), angle = 1e-5 * static_cast<double>(k);
+        std::vector<double> Y{std::cos(angle), std::sin(angle), 0.3 * random.symmetric()}, dY(p, noisy ? 0.01 : 0.0);
+        rows.add(Y, Y[0] + 2.0 * Y[1] + 3.0 * Y[2] + 0.99 * width * random.symmetric(), width, dY);
+      }
+      core::RegressionTable table = rows.table();
+      const Columns columns(table.block());
+      const IntervalHull memory = interval_hull(columns.view, positive(p)), source = interval_hull(table, positive(p));
+      ASSERT_FALSE(memory.empty || source.empty);
+      for (std::size_t j = 0; j < p; ++j) {
+        const Interval &exact = source.hull.sides[j], &found = memory.hull.sides[j];
+        EXPECT_NEAR(found.lower, exact.lower, 1e-9 * exact.width()) << seed << ' ' << j;
+        EXPECT_NEAR(found.upper, exact.upper, 1e-9 * exact.width()) << seed << ' ' << j;
+      }
+    }
   }
 }
 

@@ -129,8 +129,17 @@ TEST(Kernels, ScansFindTheSameRowsInEveryVariantAndThoseOfThePlainFormula) {
       const std::vector<double> centre = random.vector(p), half(p, 0.01), least(p, 0.1), points = random.vector(3 * p),
                                 transform = random.vector(p * p);
       const Oblique oblique{centre.data(), half.data(), transform.data()};
+      std::vector<double> middle(p), around(p);
+      const std::vector<double> nowhere(p, 0.0);
+      for (std::size_t j = 0; j < p; ++j) {
+        const auto [low, high] = std::minmax({points[j], points[p + j], points[2 * p + j]});
+        middle[j] = 0.5 * (low + high);
+        around[j] = 0.5 * (high - low) + 1e-12;
+      }
       std::vector<std::uint32_t> found(n), first[3];
       std::vector<double> peaks, first_peaks;
+      std::vector<unsigned char> first_open;
+      double first_most = 0.0;
       for (const Table* table : available()) {
         peaks.assign(p + 1, 0.0);
         const std::size_t counts[] = {
@@ -140,13 +149,36 @@ TEST(Kernels, ScansFindTheSameRowsInEveryVariantAndThoseOfThePlainFormula) {
         std::size_t count = table->scan(given.slabs, centre.data(), half.data(), least.data(), &oblique, 0.3,
                                         found.data(), peaks.data());
         const std::vector<std::uint32_t> slanted(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count));
-        count = table->violated(given.slabs, points.data(), 3, found.data());
+        // The points' box, so that it decides nothing that they do not.
+        const Points at{middle.data(), around.data(), nowhere.data(), points.data(), 3, 1.0};
+        std::vector<unsigned char> open(n / kLanes + 1, 1);
+        double most = 0.0;
+        count = table->examine(given.slabs, at, found.data(), open.data(), &most);
         const std::vector<std::uint32_t> violated(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count));
+        count = table->examine(given.slabs, at, found.data(), nullptr, nullptr);
+        EXPECT_EQ(violated, std::vector<std::uint32_t>(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count)));
         if (table == available().front()) {
           first[0] = plain;
           first[1] = slanted;
           first[2] = violated;
           first_peaks = peaks;
+          first_open = open;
+          first_most = most;
+          double largest = 0.0;
+          for (std::uint32_t i = 0; i < n; ++i) {
+            double residual = given.y[i], reach = 0.0, errors = 0.0;
+            for (std::size_t j = 0; j < p; ++j) {
+              residual -= given.Y[j][i] * middle[j];
+              reach += std::abs(given.Y[j][i]) * around[j];
+              errors += noisy ? given.dY[j][i] * around[j] : 0.0;
+            }
+            if (!(std::abs(residual) + reach <= given.dy[i] - 1e-12)) {
+              largest = std::max(largest, (reach + errors) / given.dy[i]);
+            }
+            // What is passed over holds at every point of the box.
+            EXPECT_TRUE(open[i / kLanes] != 0 || std::abs(residual) + reach <= given.dy[i] + 1e-12) << i;
+          }
+          EXPECT_NEAR(most, largest, 1e-12 * largest);
           EXPECT_TRUE(std::includes(plain.begin(), plain.end(), slanted.begin(), slanted.end()));
           for (std::uint32_t i = 0; i < n; ++i) {
             long double residual = given.y[i], reach = 0.0L, allowed = given.dy[i];
@@ -178,6 +210,8 @@ TEST(Kernels, ScansFindTheSameRowsInEveryVariantAndThoseOfThePlainFormula) {
         EXPECT_EQ(slanted, first[1]) << table->name;
         EXPECT_EQ(peaks, first_peaks) << table->name;
         EXPECT_EQ(violated, first[2]) << table->name;
+        EXPECT_EQ(open, first_open) << table->name;
+        EXPECT_EQ(most, first_most) << table->name;
       }
     }
   }
