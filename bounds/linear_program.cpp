@@ -24,7 +24,7 @@ constexpr std::size_t kRefactor = 24;  // exchanges after which the inverse is m
 constexpr double kAccurate = 1e-13;    // residual of the basis' equations that needs no fresh inverse
 constexpr double kRounding = 4.0;      // violations of rows over that of a row of the basis, both by rounding
 constexpr double kCoarse = 1e-3;       // of the optimum, what that must not come to
-constexpr std::size_t kSeen = 32;      // vertices to begin at
+constexpr std::size_t kSeen = 128;     // vertices to begin at
 constexpr double kOnBox = 1e-9;        // multiplier of a side of the box that matters
 
 }  // namespace
