@@ -12,6 +12,14 @@ bool follows(double before, double t, double nominal) noexcept {
   return t > before && !(nominal > 0.0 && t - before > kGapSteps * nominal);
 }
 
+bool is_whole(double t, std::span<const double> sample) noexcept {
+  double sum = t - t;  // of zeros, unless one of them is none
+  for (const double x : sample) {
+    sum += x - x;
+  }
+  return sum == 0.0;
+}
+
 RowDetector::RowDetector(std::size_t outputs, ThresholdRule threshold, DetectorOptions options)
     : threshold_(std::move(threshold)), options_(std::move(options)) {
   if (options_.mu) {

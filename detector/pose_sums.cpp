@@ -414,6 +414,9 @@ void PoseSumDetector::look(Scale& s, std::size_t which) {
 bool PoseSumDetector::step(double t, std::span<const double> sample) {
   looked_ = 0;
   alarm_ = false;
+  if (!is_whole(t, sample)) {
+    return false;
+  }
   if (started_ && (!follows(time_, t, measurement_.nominal_step) || t - pose_time_ > kLongestStep)) {
     restart();
   }

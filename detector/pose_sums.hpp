@@ -95,6 +95,7 @@ class PoseSumDetector {
   void restart();
   /// Takes a sample (as OdometryFilter::step, columns OdometryMeasurement::columns()). Returns whether a sum was looked
   /// at; looks() are those then. Times that do not increase, gaps, and more than a second without a pose restart.
+  /// A sample that is not whole (detector.hpp) is as good as lost.
   bool step(double t, std::span<const double> sample);
   /// The sums that were looked at with the last sample. Size 1 of SumState::c0 and c1: 1 m/s, 1 rad/s, all of the
   /// parameter.

@@ -387,6 +387,9 @@ void ScaleDetector::look(Scale& s, std::size_t which) {
 bool ScaleDetector::step(double t, std::span<const double> sample) {
   looked_ = 0;
   alarm_ = false;
+  if (!is_whole(t, sample)) {
+    return false;
+  }
   const bool element = elements_.step(t, sample);
   if (elements_.began()) {
     begin();

@@ -217,7 +217,7 @@ class Writer {
     line(" *     if (decision.fault) stop();");
     line(" *   }}");
     line(" *");
-    line(" * Samples must be finite numbers. {}", written_.segment_words());
+    line(" * A sample with a value that is no finite number is taken for lost. {}", written_.segment_words());
     line(" * pfx_restart restarts the detector at once.");
     if (measurement_.motion == MotionKind::mean_speed) {
       line(" * A decision is about the interval of the sample before, whose effort the last one has made known.");
@@ -418,13 +418,14 @@ class Writer {
     if (thresholds()) {
       line("  double dy[PFX_CHANNELS][PFX_PARAMETERS], torque_error[PFX_CHANNELS];");
     }
+    line("  const int whole = pfx_whole(t, sample);");
     line("  int valid, i, j;");
-    line("  if (s->started && (!(t > s->elements.sample[0].t){})) {{",
+    line("  if (whole && s->started && (!(t > s->elements.sample[0].t){})) {{",
          measurement_.nominal_step > 0.0 ? " || t - s->elements.sample[0].t > PFX_GAP" : "");
     line("    pfx_restart(s);");
     line("  }}");
-    line("  s->started = 1;");
-    line("  valid = pfx_filter(s, t, sample);");
+    line("  s->started = s->started || whole;");
+    line("  valid = whole && pfx_filter(s, t, sample);");
     line("  decision->valid = valid;");
     line("  decision->fault = 0;");
     line("  if (valid) {{");

@@ -22,7 +22,7 @@ struct CExportOptions {
 /// functions. No heap, no mutable static data, no recursion, bounded work; of libm exp, fabs, and round, cos or sin
 /// where the model needs them. Each operation of RegressorFilter, ThresholdRule and Detector is there in the same
 /// order, what motion and efforts may do between samples included: with -ffp-contract=off and the same libm every
-/// decision, residual and threshold has the same bits, for finite samples. What a model does not need is left out.
+/// decision, residual and threshold has the same bits. What a model does not need is left out.
 ///
 /// The detector counts as new: what it has seen is not exported. Throws InputError where `name` cannot be a prefix;
 /// where effects correct the efforts, or efforts are late by a stated time; where a term of the model is a function

@@ -912,6 +912,16 @@ void FilterWriter::advance(Text& out) const {
 }
 
 void FilterWriter::take_sample(Text& out) const {
+  out.put(
+      "\n/* Whether all of a sample are finite numbers: one that is not is taken for lost. */\n"
+      "static inline int pfx_whole(double t, const double *input)\n{\n");
+  out.line("  double sum = t - t; /* of zeros, unless one of them is none */");
+  out.line("  int i;");
+  out.line("  for (i = 0; i < PFX_INPUTS; ++i) {{");
+  out.line("    sum += input[i] - input[i];");
+  out.line("  }}");
+  out.line("  return sum == 0.0;");
+  out.put("}\n");
   out.put("\n/* The next sample starts a segment. */\nstatic inline void pfx_forget(pfx_elements *s)\n{\n");
   out.line("  s->samples = s->instants = 0;");
   out.line_if(nodes_ && lost_, "  s->after_loss = 0;");

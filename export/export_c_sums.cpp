@@ -640,6 +640,9 @@ static inline int pfx_sums_step(pfx_sums *s, double t, const double sample[PFX_I
   pfx_element element;
   int any, k;
   s->looks = s->alarm = 0;
+  if (!pfx_whole(t, sample)) {
+    return 0;
+  }
 )";
   text += line("  if (s->started && (!(t > s->elements.sample[0].t){})) {{",
                sums_.elements().measurement().nominal_step > 0.0 ? " || t - s->elements.sample[0].t > PFX_GAP" : "");

@@ -5,6 +5,7 @@
 #   tests/long.sh slow        properties over hundreds of runs
 #   tests/long.sh campaign    the campaign on random robots, five minutes of it
 #   tests/long.sh fuzz [SECONDS]  every fuzzer for a minute, or so long (docs/fuzzing.md)
+#   tests/long.sh endurance   a day at 1 kHz, with trouble every hour (tools/endurance.py, ten minutes)
 #   tests/long.sh sanitizers  all test programs once more under AddressSanitizer and UndefinedBehaviorSanitizer, but for these
 set -eu
 cd "$(dirname "$0")/.."
@@ -23,6 +24,10 @@ for part in ${*:-slow campaign sanitizers}; do
       tools/build.sh release wheelwright-campaign
       ctest --test-dir build --output-on-failure --no-tests=error -R "$campaign"
       ;;
+    endurance)
+      tools/build.sh release wheelwright wheelwright-endurance
+      tools/endurance.py build
+      ;;
     sanitizers)
       tools/build.sh asan
       tests/sanitized.py "$jobs"
@@ -34,7 +39,7 @@ for part in ${*:-slow campaign sanitizers}; do
       ;;
     [0-9]*) ;;
     *)
-      echo "usage: tests/long.sh [slow] [campaign] [sanitizers] | fuzz [SECONDS]" >&2
+      echo "usage: tests/long.sh [slow] [campaign] [endurance] [sanitizers] | fuzz [SECONDS]" >&2
       exit 2
       ;;
   esac

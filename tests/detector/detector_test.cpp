@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
+#ifdef __SSE2__
+#include <xmmintrin.h>
+#endif
+
 #include <algorithm>
 #include <array>
+#include <cfenv>
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -166,6 +173,76 @@ TEST(Detector, RestartsWhereTimeGoesBackAndWhenItIsTold) {
   walk(told, log, 0, 300, 0.0);
   told.restart();
   expect_same(walk(told, log, 0, 600, 0.0), expected);
+}
+
+// Samples that are no numbers are as if they had never come: the detector is neither blind nor mistaken afterwards.
+TEST(Detector, ASampleThatIsNoNumberIsLost) {
+  const Known known;
+  const LogTable log = sim::simulate(known.scenario);
+  Detector without = known.detector(), with = known.detector();
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
+  std::size_t valid = 0;
+  for (std::size_t k = 0; k < 1400; ++k) {
+    std::array sample{log.column("phi_r")[k], log.column("phi_l")[k], log.column("tau_r")[k], log.column("tau_l")[k]};
+    const bool storm = k >= 700 && k < 702, alone = k % 311 == 310;
+    double t = log.t[k];
+    if (storm || alone) {
+      (k % 5 == 4 ? t : sample[k % 4]) = k % 2 == 0 ? nan : -infinite;
+      const Decision& lost = with.step(t, sample);
+      EXPECT_FALSE(lost.valid || lost.fault) << k;
+      continue;
+    }
+    const Decision expected = without.step(t, sample);
+    const Decision& found = with.step(t, sample);
+    ASSERT_EQ(found.valid, expected.valid) << k;
+    ASSERT_EQ(found.fault, expected.fault) << k;
+    if (found.valid) {
+      expect_same(found, expected);
+      ++valid;
+    }
+  }
+  EXPECT_GT(valid, 700u);
+}
+
+// A client may have set another rounding mode, or (linked with fast-math) have denormals flushed to zero.
+TEST(Detector, RoundingOfItsCallerChangesDigitsOnly) {
+  const Known known;
+  const LogTable log = sim::simulate(known.scenario);
+  const auto said = [&] {
+    Detector detector = known.detector();
+    std::vector<Interval> all;  // residual and half the threshold's width
+    for (std::size_t k = 0; k < 1400; ++k) {
+      const std::array sample{log.column("phi_r")[k], log.column("phi_l")[k], log.column("tau_r")[k],
+                              log.column("tau_l")[k]};
+      const Decision& d = detector.step(log.t[k], sample);
+      for (std::size_t i = 0; d.valid && i < d.channels.size(); ++i) {
+        all.push_back({d.channels[i].residual, 0.5 * d.channels[i].threshold.width()});
+      }
+    }
+    return all;
+  };
+  const std::vector<Interval> usual = said();
+  ASSERT_GT(usual.size(), 1000u);
+  const auto compare = [&](const std::vector<Interval>& other, const char* mode) {
+    ASSERT_EQ(other.size(), usual.size()) << mode;
+    for (std::size_t k = 0; k < usual.size(); ++k) {
+      ASSERT_NEAR(other[k].lower, usual[k].lower, 1e-9 * usual[k].upper + 1e-13) << mode << ' ' << k;
+      ASSERT_NEAR(other[k].upper, usual[k].upper, 1e-9 * usual[k].upper + 1e-13) << mode << ' ' << k;
+    }
+  };
+  for (const auto& [mode, name] : {std::pair(FE_UPWARD, "up"), {FE_DOWNWARD, "down"}, {FE_TOWARDZERO, "to zero"}}) {
+    std::fesetround(mode);
+    const std::vector<Interval> other = said();
+    std::fesetround(FE_TONEAREST);
+    compare(other, name);
+  }
+#ifdef __SSE2__
+  const unsigned before = _mm_getcsr();
+  _mm_setcsr(before | 0x8040U);  // flush to zero, denormals are zeros
+  const std::vector<Interval> other = said();
+  _mm_setcsr(before);
+  compare(other, "flush to zero");
+#endif
 }
 
 TEST(Detector, RestartForgetsThePersistence) {

@@ -53,6 +53,7 @@ struct Case {
   double jitter = 0.0;    // share of the step
   bool lost = false;      // single rows are missing, and steps of 1.6 steps
   double gap = 0.3;       // s
+  bool storms = false;    // some samples are no numbers, alone and in spells
   Interval delay{0.0, 0.0};
   detector::DetectorOptions options{};
   Eigen::Index half_spaces = 4;  // for each parameter
@@ -217,6 +218,12 @@ struct World {
         samples.push_back(heading_ + 0.001 * random_.symmetric());
       }
       t.push_back(now_);
+      if (case_.storms && (row_ % 457 == 456 || row_ % 1300 >= 1270)) {
+        samples[samples.size() - 1 - row_ % (2 * joints)] = row_ % 2 == 0 ? std::nan("") : INFINITY;
+      }
+      if (case_.storms && row_ % 1111 == 1110) {
+        t.back() = std::nan("");
+      }
     }
   }
 
@@ -411,6 +418,13 @@ TEST_F(ExportC, StartsAnewAfterAStepThatIsTooLong) {
   c.design = {};
   c.noisy = false;
   expect_loss(c, "angles");
+}
+
+TEST_F(ExportC, TakesWhatIsNoNumberForLost) {
+  for (const MotionKind motion : {MotionKind::angle, MotionKind::speed}) {
+    const Case c{.model = drive(false, true), .motion = motion, .storms = true};
+    expect_same(c, motion == MotionKind::angle ? "angles" : "speeds");
+  }
 }
 
 TEST_F(ExportC, DecidesAsTheLibraryWithEveryRule) {
