@@ -12,8 +12,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include <wheelwright/core/error.hpp>
 
@@ -52,10 +54,21 @@ void promised(const Use& use) {
   }
 }
 
-/// Puts `bytes` into a file of this process with that ending, and returns its path.
+/// A file that is gone with the process.
+struct FileOfProcess {
+  std::filesystem::path path;
+  ~FileOfProcess() {
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
+  }
+};
+
+/// Puts `bytes` into a file of this process with that ending, and returns its path. It is removed when the process ends.
 inline std::filesystem::path on_disk(std::string_view bytes, const std::string& ending) {
   const auto path =
       std::filesystem::temp_directory_path() / ("wheelwright-fuzz-" + std::to_string(::getpid()) + ending);
+  static std::map<std::string, FileOfProcess> of_process;
+  of_process[ending].path = path;
   std::filesystem::remove(path);  // a file that is new is not flushed to disk on closing
   std::ofstream(path, std::ios::binary | std::ios::trunc)
       .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));

@@ -10,7 +10,7 @@ folder=${2:?usage: fuzz/seeds.sh PROGRAM FOLDER}
 house=$(realpath "$(dirname "$0")/..")
 examples=$house/examples
 rm -rf "$folder"
-for name in csv follow hdf5 db3 mcap messages robot urdf model study; do
+for name in csv follow hdf5 db3 journal mcap messages metadata robot urdf controllers fleet model study scenario; do
   mkdir -p "$folder/$name"
 done
 cd "$folder"
@@ -24,6 +24,18 @@ duration: 0.5
 rate: 50
 EOF
 "$program" simulate drive.yaml --out csv/drive.csv --quiet
+cp drive.yaml scenario/
+sed 's/^robot:.*/robot: {model: differential_drive, wheel_radius: 0.1, track_width: 0.4, effort: {kind: torque, hold: zero_order}}/' \
+  drive.yaml > scenario/inline.yaml
+cat >> scenario/inline.yaml <<EOF
+start: {pose: [0, 1, 0.2], error: [0, 0.1, 0]}
+faults: [{kind: slip_yaw, magnitude: 0.1, onset: 0.2, shape: ramp, rise_time: 0.1, end: 0.4}]
+sensors: {sampling: interval, noise: two_point, wheel_angle: 0.01, effort: 0.02, log: [angles, pose]}
+effects: [{effect: coulomb, right: 0.1, left: 0.1}]
+time_jitter: 0.1
+gaps: [[0.2, 0.3]]
+seed: 4
+EOF
 cp csv/drive.csv follow/
 sed 's/,/;/g; 5s/^.*$/# a remark/; 9s/;[^;]*$/;nan/' csv/drive.csv > csv/semicolons.csv
 awk 'BEGIN {
@@ -39,6 +51,49 @@ gzip -c csv/drive.csv > csv/drive.csv.gz
 for compression in none zstd lz4; do
   "$program" convert csv/drive.csv "mcap/$compression.mcap" --compression "$compression" --quiet
 done
+
+# What SQLite leaves beside a recording: a write-ahead log (after an even byte), a journal (after an odd one).
+python3 - "$folder" <<'EOF'
+import pathlib
+import shutil
+import sqlite3
+import sys
+
+folder = pathlib.Path(sys.argv[1])
+for mode, ending, first in (("WAL", "-wal", b"\0"), ("DELETE", "-journal", b"\1")):
+    shutil.copy(folder / "db3/drive.db3", folder / "open.db3")
+    base = sqlite3.connect(folder / "open.db3", isolation_level=None)
+    base.execute(f"PRAGMA journal_mode={mode}")
+    base.execute("PRAGMA cache_size=1")
+    base.execute("BEGIN IMMEDIATE")
+    base.execute("UPDATE messages SET timestamp = timestamp + 1")
+    if mode == "WAL":
+        base.execute("COMMIT")
+    (folder / f"journal/{mode.lower()}").write_bytes(first + (folder / f"open.db3{ending}").read_bytes())
+    base.close()
+(folder / "open.db3").unlink()
+EOF
+"$program" convert csv/drive.csv bag --quiet
+cp bag/metadata.yaml metadata/
+rm -r bag
+printf 'rosbag2_bagfile_information:\n  message_count: 3\n  relative_file_paths: [a_0.mcap, ../secret.mcap, a_1.mcap]\n' \
+  > metadata/two.yaml
+printf 'robot,log,when,robot_file,role\na,one.csv,2026-03-01,,commission\na,two.csv,2026-03-02,,check\nb,c.csv,3,r.yaml,\n' \
+  > fleet/list.csv
+cat > controllers/controllers.yaml <<EOF
+controller_manager: {ros__parameters: {update_rate: 50}}
+diff_drive_controller:
+  ros__parameters:
+    left_wheel_names: [left]
+    right_wheel_names: [right]
+    wheel_separation: 0.4
+    wheel_radius: 0.05
+    wheel_separation_multiplier: 1.02
+    linear.x.has_velocity_limits: true
+    linear.x.max_velocity: 1.0
+    angular: {z: {max_velocity: 2.0, max_acceleration: .nan}}
+    publish_rate: 50.0
+EOF
 
 # Definitions, and behind a zero byte messages.
 printf 'float64 x\nint32[] n\nstring name\n\0\0\1\0\0' > messages/plain
@@ -93,4 +148,8 @@ words messages logs/ros_definition.cpp
 words robot robots/robot_keys.cpp robots/robot_file.cpp
 words urdf robots/robot_description.cpp robots/wheel_geometry.cpp robots/robot_origin.cpp robots/controller_file.cpp
 words model robots/online_model_file.cpp robots/robot_keys.cpp
+words controllers robots/controller_file.cpp
+words scenario results/scenario_file.cpp robots/robot_keys.cpp
+printf '"rosbag2_bagfile_information"\n"relative_file_paths"\n"files"\n"message_count"\n"../"\n"/"\n' > metadata.dict
+printf '"robot"\n"log"\n"when"\n"robot_file"\n"role"\n"commission"\n"check"\n"2026-03-01"\n' > fleet.dict
 words study results/study_json.cpp study/study_case.cpp study/study_quantity.cpp

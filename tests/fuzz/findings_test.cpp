@@ -13,8 +13,8 @@
 // The fuzzers' entry points, each under a name of its own (tests/CMakeLists.txt).
 using Fuzzer = int(const std::uint8_t* data, std::size_t size);
 extern "C" {
-Fuzzer fuzz_csv, fuzz_db3, fuzz_follow, fuzz_hdf5, fuzz_mcap, fuzz_messages, fuzz_model, fuzz_robot, fuzz_study,
-    fuzz_urdf;
+Fuzzer fuzz_controllers, fuzz_csv, fuzz_db3, fuzz_fleet, fuzz_follow, fuzz_hdf5, fuzz_journal, fuzz_mcap,
+    fuzz_messages, fuzz_metadata, fuzz_model, fuzz_robot, fuzz_scenario, fuzz_study, fuzz_urdf;
 // libFuzzer has it; nothing is mutated here.
 std::size_t LLVMFuzzerMutate(std::uint8_t*, std::size_t size, std::size_t) { return size; }
 }
@@ -23,9 +23,21 @@ namespace wheelwright::fuzz_test {
 namespace {
 
 const std::map<std::string, Fuzzer*> fuzzers = {
-    {"csv", fuzz_csv},           {"db3", fuzz_db3},     {"follow", fuzz_follow}, {"hdf5", fuzz_hdf5},
-    {"mcap", fuzz_mcap},         {"model", fuzz_model}, {"robot", fuzz_robot},   {"study", fuzz_study},
-    {"messages", fuzz_messages}, {"urdf", fuzz_urdf},
+    {"controllers", fuzz_controllers},
+    {"csv", fuzz_csv},
+    {"db3", fuzz_db3},
+    {"fleet", fuzz_fleet},
+    {"follow", fuzz_follow},
+    {"hdf5", fuzz_hdf5},
+    {"journal", fuzz_journal},
+    {"mcap", fuzz_mcap},
+    {"messages", fuzz_messages},
+    {"metadata", fuzz_metadata},
+    {"model", fuzz_model},
+    {"robot", fuzz_robot},
+    {"scenario", fuzz_scenario},
+    {"study", fuzz_study},
+    {"urdf", fuzz_urdf},
 };
 
 // A promise that does not hold ends the program.
@@ -43,6 +55,19 @@ TEST(Findings, MakeAResultThatKeepsItsPromisesOrAnInputError) {
     }
   }
   EXPECT_GT(found, 0U);
+}
+
+// Each fuzzer runs, on what every one of them is to stand.
+TEST(Fuzzers, StandNothingAndNoise) {
+  std::string noise(4096, '\0');
+  for (std::size_t k = 0; k < noise.size(); ++k) {
+    noise[k] = static_cast<char>(k * 2654435761U >> 13);
+  }
+  for (const auto& [name, fuzzer] : fuzzers) {
+    for (const std::string& bytes : {std::string(), std::string("\0", 1), std::string("{}"), std::string("a: [1, 2]\n"), noise}) {
+      EXPECT_EQ(fuzzer(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()), 0) << name;
+    }
+  }
 }
 
 }  // namespace
