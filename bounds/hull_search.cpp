@@ -10,7 +10,8 @@
 namespace wheelwright::bounds {
 namespace {
 
-constexpr std::size_t kFirst = 1 << 15;  // rows of the first portion
+constexpr std::size_t kFirst = 1 << 15;    // rows of the first portion
+constexpr std::size_t kLargest = 1 << 18;  // of any: should all of them cut, they are held at once
 constexpr std::size_t kChunk = 1 << 13;  // rows that are looked at in one call
 constexpr std::size_t kWorthAThread = 1 << 14;
 constexpr std::size_t kSparse = 8;    // one row out of so many is worth going after
@@ -166,8 +167,8 @@ bool HullSearch::add(const SlabColumns& rows) {
 bool HullSearch::cut(const SlabColumns& rows) {
   open_.assign(rows.n / kernels::kLanes + 1, 1);
   near_ = kNear;
-  for (std::size_t first = 0, size = kFirst; first < rows.n; first += size) {
-    size = std::min(std::max(size, first), rows.n - first);
+  for (std::size_t first = 0, size = 0; first < rows.n; first += size) {
+    size = std::min(std::clamp(first, kFirst, kLargest), rows.n - first);
     begin();
     examine(rows, first, size);
     if (!add(rows)) {
