@@ -323,7 +323,7 @@ struct Loops {
         reach += rows.dY(j) * at.half[j];
       }
       const Vector ratio = reach / least;
-      largest = beyond & (ratio > largest) ? ratio : largest;
+      largest = (beyond & (ratio > largest)) ? ratio : largest;
       Mask over{};
       const Vector y = rows.y(), dy = rows.dy();
       const auto hold = [&](const double* x, Vector e) {

@@ -4,6 +4,7 @@
 // RC_PARAMS="seed=42 max_success=100".
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <numeric>
 
 #include <rapidcheck.h>
@@ -237,6 +238,96 @@ TEST_F(Metamorphic, RowsOfABagAreTakenByTheirStamps) {
       std::ranges::for_each(table.columns, reversed);
     });
     RC_ASSERT(difference(before, answers(mixed), 0.0) == "");
+  });
+  EXPECT_TRUE(holds);
+}
+
+// Several files are the segments of one log: what stands in two is what one says that has a gap between them.
+TEST_F(Metamorphic, ALogMayStandInSeveralFiles) {
+  const bool holds = rc::check("split", [this] {
+    const Drive drive = drawn();
+    const auto rows = static_cast<int>(drive.healthy.rows());
+    const auto at = static_cast<std::size_t>(*rc::gen::inRange(rows / 3, 2 * rows / 3));
+    const Drive torn = changed(drive, [&](LogTable& table) {
+      for (std::size_t k = at; k < table.rows(); ++k) {
+        table.t[k] += 1.0;
+      }
+    });
+    put("this.yaml", drive.robot);
+    write("one.csv", torn.healthy);
+    const auto part = [&](const std::string& name, std::size_t first, std::size_t last) {
+      LogTable some = torn.healthy;
+      const auto cut = [&](std::vector<double>& values) {
+        values = {values.begin() + static_cast<std::ptrdiff_t>(first),
+                  values.begin() + static_cast<std::ptrdiff_t>(last)};
+      };
+      cut(some.t);
+      std::ranges::for_each(some.columns, cut);
+      write(name, some);
+    };
+    part("first.csv", 0, at);
+    part("second.csv", at, torn.healthy.rows());
+    const Json one = said("commission one.csv --robot this.yaml"),
+               two = said("commission first.csv second.csv --robot this.yaml");
+    for (const char* key : {"physical", "feasible_set", "detector", "validation"}) {
+      RC_ASSERT(difference(one.at(key), two.at(key), 0.0, 0.0, key) == "");
+    }
+  });
+  EXPECT_TRUE(holds);
+}
+
+// Units of columns are the user's: a log in halves of a radian, and the factor told, is the log in radians to the last bit.
+TEST_F(Metamorphic, UnitsOfColumnsMayBeTold) {
+  const bool holds = rc::check("columns in other units, with --map", [this] {
+    const Drive drive = drawn();
+    const double unit = *rc::gen::element(0.5, 0.125, 4.0);
+    put("this.yaml", drive.robot);
+    write("plain.csv", drive.healthy);
+    LogTable other = drive.healthy;
+    std::string mapped;
+    for (const std::string name : {"omega_r", "omega_l", "phi_r", "phi_l", "tau_r", "tau_l"}) {
+      std::ranges::for_each(other.column(name), [&](double& value) { value /= unit; });
+      std::ranges::replace(other.names, name, "raw_" + name);
+      mapped += fmt::format(" --map {0}=raw_{0}*{1}", name, unit);
+    }
+    write("other.csv", other);
+    const Json before = said("commission plain.csv --robot this.yaml"),
+               after = said("commission other.csv --robot this.yaml" + mapped);
+    for (const char* key : {"physical", "feasible_set", "detector", "validation"}) {
+      RC_ASSERT(difference(before.at(key), after.at(key), 0.0, 0.0, key) == "");
+    }
+  });
+  EXPECT_TRUE(holds);
+}
+
+TEST_F(Metamorphic, ARobotOfAFleetIsJudgedByItsLogsAlone) {
+  const bool holds = rc::check("robots renamed and listed in another order", [this] {
+    const Drive drive = drawn();
+    put("this.yaml", drive.robot);
+    write("healthy.csv", drive.healthy);
+    write("sound.csv", drive.healthy);
+    write("faulty.csv", drive.faulty);
+    // What is said of the fleet, with the robot that has the fault called x and the other y.
+    const auto fleet = [&](const std::string& faulty, const std::string& sound, bool first) {
+      const std::string one = fmt::format("{0},healthy.csv,commission\n{0},faulty.csv,check\n", faulty),
+                        two = fmt::format("{0},healthy.csv,commission\n{0},sound.csv,check\n", sound);
+      put("list.csv", "robot,log,role\n" + (first ? one + two : two + one));
+      Json said_of = said("fleet list.csv --robot this.yaml");
+      const std::function<void(Json&)> rename = [&](Json& value) {
+        if (value.is_structured()) {
+          std::ranges::for_each(value, rename);
+        } else if (value == Json(faulty) || value == Json(sound)) {
+          value = value == Json(faulty) ? "x" : "y";
+        }
+      };
+      rename(said_of);
+      return said_of;
+    };
+    const Json before = fleet("a", "b", true), after = fleet("z 9", "b-1", false);
+    RC_ASSERT(before.at("alarms").size() == 1);
+    for (const char* key : {"robots", "alarms", "population", "drift", "outside", "failed"}) {
+      RC_ASSERT(difference(before.at(key), after.at(key), 1e-12, 0.0, key) == "");
+    }
   });
   EXPECT_TRUE(holds);
 }
