@@ -52,7 +52,7 @@ void write_log(const std::filesystem::path& path, logs::McapCompression compress
 
 void read_messages(const std::filesystem::path& path, bool decoded) {
   const auto bag = logs::open_bag({path});
-  logs::RosExtractor extractor(bag->topics().at(0).definition.value(),
+  logs::RosExtractor extractor(*bag->topics().at(0).definition,
                                {"velocity[left_wheel_joint]", "velocity[right_wheel_joint]", "effort[left_wheel_joint]",
                                 "effort[right_wheel_joint]"});
   std::array<double, 4> values{};

@@ -11,6 +11,8 @@
 ///
 ///     wheelwright-endurance MODEL.json LOG.csv [HOURS]      prints what it found; ends with 1 where something differs
 ///     wheelwright-endurance MODEL.json LOG.csv HOURS --emit the same rows as CSV, for `wheelwright detect --follow`
+#include <dlfcn.h>
+#include <unistd.h>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -19,7 +21,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <dlfcn.h>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -28,7 +29,6 @@
 #include <random>
 #include <string>
 #include <string_view>
-#include <unistd.h>
 #include <vector>
 
 #include <fmt/format.h>
@@ -115,9 +115,9 @@ struct Watched {
     if (said.valid && before.valid) {
       largest_difference = std::max(largest_difference, std::abs(said.size - before.size));
     }
-    different += said.fault != before.fault || (said.valid && before.valid && !(std::abs(said.size - before.size) < 1e-6))
-                     ? 1
-                     : 0;
+    different +=
+        said.fault != before.fault || (said.valid && before.valid && !(std::abs(said.size - before.size) < 1e-6)) ? 1
+                                                                                                                  : 0;
   }
 };
 
@@ -138,8 +138,8 @@ class Exported {
                                          "    *size += d.channel[i].residual / width;\n"
                                          "  }\n"
                                          "  return d.valid + 2 * d.fault;\n}\n";
-    const std::string command =
-        fmt::format("cc -std=c99 -O2 -ffp-contract=off -shared -fPIC -o '{0}/robot.so' '{0}/robot.c' -lm", folder.string());
+    const std::string command = fmt::format(
+        "cc -std=c99 -O2 -ffp-contract=off -shared -fPIC -o '{0}/robot.so' '{0}/robot.c' -lm", folder.string());
     if (std::system(command.c_str()) == 0) {
       library_ = dlopen((folder / "robot.so").c_str(), RTLD_NOW | RTLD_LOCAL);
     }
@@ -210,10 +210,10 @@ class Player {
     };
     spell(t, step, std::numeric_limits<double>::quiet_NaN());
     spell(t + 0.2, step, -std::numeric_limits<double>::infinity());
-    spell(t - 20.0, step, sample[0]);                                // the clock jumps back
-    spell(t - 20.0, 0.0, sample[0]);                                 // and stands
+    spell(t - 20.0, step, sample[0]);                                 // the clock jumps back
+    spell(t - 20.0, 0.0, sample[0]);                                  // and stands
     spell(t + 0.4, step, std::numeric_limits<double>::denorm_min());  // too small to be normal
-    spell(t + 0.6, 2.0 * step, sample[0]);                           // every other row is lost
+    spell(t + 0.6, 2.0 * step, sample[0]);                            // every other row is lost
   }
 
   const LogTable& log_;
@@ -267,7 +267,8 @@ int watch(const OnlineModel& model, Player& player, double hours) {
         first_hour = hour == 1.0 ? last_hour : first_hour;
       });
   fmt::print("memory after the first hour {:.1f} MB, after the last {:.1f} MB\n\n", first_hour, last_hour);
-  fmt::print("| | steps | of them decided | alarms | different | largest difference | p50 | p99 | p99.99 | longest |\n");
+  fmt::print(
+      "| | steps | of them decided | alarms | different | largest difference | p50 | p99 | p99.99 | longest |\n");
   fmt::print("|---|---|---|---|---|---|---|---|---|---|\n");
   bool sound = last_hour < 1.02 * first_hour + 1.0;
   for (const Watched& w : all) {

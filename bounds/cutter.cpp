@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kBatch = 512;        // fresh candidates that are worth a linear program
 constexpr std::size_t kPortion = 1 << 17;  // rows that are looked at before the box is made anew
-constexpr std::size_t kFew = 1 << 13;  // rows put aside that are not worth a look yet
+constexpr std::size_t kFew = 1 << 13;      // rows put aside that are not worth a look yet
 
 }  // namespace
 

@@ -11,7 +11,7 @@
 namespace wheelwright::bounds {
 namespace {
 
-constexpr double kCut = 1e-12;  // of the size of the set: a row that cuts less than that is left out
+constexpr double kCut = 1e-12;           // of the size of the set: a row that cuts less than that is left out
 constexpr std::size_t kManyRounds = 20;  // of cutting, from which rows are looked at for having been there
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kFirst = 1 << 15;    // rows of the first portion
 constexpr std::size_t kLargest = 1 << 18;  // of any: should all of them cut, they are held at once
-constexpr std::size_t kChunk = 1 << 13;  // rows that are looked at in one call
+constexpr std::size_t kChunk = 1 << 13;    // rows that are looked at in one call
 constexpr std::size_t kWorthAThread = 1 << 14;
 constexpr std::size_t kSparse = 8;    // one row out of so many is worth going after
 constexpr double kNear = 0.02;        // share of its bounds that a row at hand leaves at most
@@ -95,7 +95,8 @@ void HullSearch::examine(const SlabColumns& rows, std::size_t first, std::size_t
     std::vector<std::uint32_t> found(kChunk);
     for (std::size_t i = begin; i < end; i += kChunk) {
       const SlabColumns some = rows.part(i, std::min(kChunk, end - i));
-      const kernels::Slabs slabs{some.Y.data(), some.dY.empty() ? nullptr : some.dY.data(), some.y, some.dy, some.n, p_};
+      const kernels::Slabs slabs{
+          some.Y.data(), some.dY.empty() ? nullptr : some.dY.data(), some.y, some.dy, some.n, p_};
       unsigned char* open = open_.data() + i / kernels::kLanes;
       unsigned char* last = open + (some.n + kernels::kLanes - 1) / kernels::kLanes;
       // Where many rows are read anyway, to leave out some costs more than it saves.

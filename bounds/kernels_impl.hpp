@@ -372,8 +372,8 @@ struct Loops {
   }
 
   template <int P>
-  static std::size_t examine_with(const Slabs& slabs, const Points& at, std::uint32_t* found,
-                                  unsigned char* open, double* most) {
+  static std::size_t examine_with(const Slabs& slabs, const Points& at, std::uint32_t* found, unsigned char* open,
+                                  double* most) {
     if constexpr (P > 0) {
       if (slabs.p != P || slabs.dY != nullptr) {
         return examine_with<P - 1>(slabs, at, found, open, most);

@@ -97,7 +97,7 @@ class LinearProgram {
   std::vector<double> lower_, upper_;
   std::vector<double> a_, b_;
   std::size_t count_ = 0, stride_ = 0;
-  Basis basis_;                  // .inverse: column r is the edge along which only row r of the basis is left
+  Basis basis_;  // .inverse: column r is the edge along which only row r of the basis is left
   std::vector<double> x_, lambda_, slack_, along_, row_, alpha_, direction_;
   bool factored_ = false;
   bool settled_ = false;      // x_ satisfies all rows

@@ -63,7 +63,7 @@ std::size_t distinct(const std::vector<Run>& runs) {
   std::vector<double> values(runs.size());
   std::ranges::transform(runs, values.begin(), &Run::value);
   std::ranges::sort(values);
-  return values.size() - std::ranges::unique(values).size();
+  return static_cast<std::size_t>(std::unique(values.begin(), values.end()) - values.begin());
 }
 
 LogFinding about(const char* id, FindingSeverity severity, const std::string& column, std::string sentence,

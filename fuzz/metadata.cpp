@@ -29,7 +29,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::ofstream(bag / "metadata.yaml", std::ios::binary) << fuzz::text_of(data, size);
   return fuzz::clean([&] {
     for (const logs::bag::Part& part : logs::bag::parts_of(bag).files) {
-      fuzz::require(std::filesystem::weakly_canonical(part.path).parent_path() == std::filesystem::canonical(bag));
+      fuzz::require(part.path.lexically_normal().parent_path() == bag);
     }
   });
 }

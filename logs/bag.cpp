@@ -28,6 +28,14 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t most_read_topics = 10'000;
+constexpr std::size_t most_named = 10;  ///< files that cannot be read
+
+/// A definition in a recording, parsed, or why that failed.
+struct ParsedDefinition {
+  std::shared_ptr<const std::string> text;  ///< keeps its address its own
+  std::shared_ptr<const RosDefinition> definition;
+  std::string defect;
+};
 
 /// Files one behind the other.
 class Bag final : public BagReader {
@@ -70,7 +78,7 @@ class Bag final : public BagReader {
     }
     at_ = 0;
     reports_ = opened_;
-    unpacked_wrong_ = 0;
+    unpacked_wrong_ = packed_bytes_ = unpacked_bytes_ = 0;
     for (BagTopic& topic : topics_) {
       topic.messages = 0;
     }
@@ -94,6 +102,7 @@ class Bag final : public BagReader {
     const bag::Parts parts = bag::parts_of(path, trust_);
     const std::size_t first = files_.size();
     std::vector<std::string> losses = parts.losses;
+    std::size_t lost = 0;
     for (const bag::Part& part : parts.files) {
       try {
         look_into(part);
@@ -101,8 +110,14 @@ class Bag final : public BagReader {
         if (part.demanded) {
           throw;
         }
-        losses.emplace_back(error.what());
+        if (++lost <= most_named) {
+          losses.emplace_back(error.what());
+        }
       }
+    }
+    if (lost > most_named) {
+      losses.push_back(fmt::format("{}: {} more of its {} files cannot be read", path.string(), lost - most_named,
+                                   parts.files.size()));
     }
     if (files_.size() == first) {
       throw InputError(fmt::format("{}: none of its {} files can be read: {}", path.string(), parts.files.size(),
@@ -165,8 +180,10 @@ class Bag final : public BagReader {
     losses.insert(losses.end(), report.losses.begin(), report.losses.end());
     if (unpacked_wrong_ > 0) {
       losses.push_back(
-          fmt::format("{}: {} messages packed with zstd could not be unpacked and are left out, the first {}",
-                      report.path, unpacked_wrong_, first_wrong_));
+          fmt::format("{}: {} messages packed with zstd could not be unpacked and are left out, the first {}: they are "
+                      "damaged, or have{} more than 512 MiB",
+                      report.path, unpacked_wrong_, first_wrong_,
+                      trust_ ? "" : " more than 32 MiB and 100 times their size (which --trust allows), or"));
     }
     report.losses = std::move(losses);
     reports_[at_] = std::move(report);
@@ -185,7 +202,7 @@ class Bag final : public BagReader {
                                                    file.metadata, messages, *file.promised));
       }
     }
-    unpacked_wrong_ = 0;
+    unpacked_wrong_ = packed_bytes_ = unpacked_bytes_ = 0;
     ++at_;
     if (files_.size() > 1) {
       source_.reset();
@@ -215,14 +232,13 @@ class Bag final : public BagReader {
       found.no_definition = fmt::format("its messages are in {}: only cdr can be read", files::shown(topic.encoding));
       return found;
     }
-    if (topic.schema_encoding == "ros2msg" && !topic.schema.empty()) {
-      try {
-        found.definition = parse_ros_definition(topic.type, topic.schema);
-        found.definition->origin = "the recording";
+    if (topic.schema_encoding == "ros2msg" && topic.schema != nullptr && !topic.schema->empty()) {
+      const ParsedDefinition& parsed = definition_of(topic);
+      if (parsed.definition != nullptr) {
+        found.definition = parsed.definition;
         return found;
-      } catch (const InputError& error) {
-        found.no_definition = fmt::format("its definition in the recording is damaged ({})", error.what());
       }
+      found.no_definition = fmt::format("its definition in the recording is damaged ({})", parsed.defect);
     } else if (topic.schema_encoding == "ros2idl") {
       found.no_definition = "its definition in the recording is IDL, which is not read";
     } else {
@@ -230,7 +246,8 @@ class Bag final : public BagReader {
     }
     try {
       for (const RosDefinitions& directory : definitions_) {
-        if ((found.definition = directory.find(topic.type))) {
+        if (auto definition = directory.find(topic.type)) {
+          found.definition = std::make_shared<const RosDefinition>(*std::move(definition));
           break;
         }
       }
@@ -239,7 +256,9 @@ class Bag final : public BagReader {
       return found;
     }
     if (!found.definition) {
-      found.definition = bundled(topic.type, place);
+      if (auto definition = bundled(topic.type, place)) {
+        found.definition = std::make_shared<const RosDefinition>(*std::move(definition));
+      }
     }
     if (found.definition) {
       found.no_definition.clear();
@@ -248,6 +267,23 @@ class Bag final : public BagReader {
           ", and {} is not bundled: expected the directory of its .msg file as --msg-path", files::shown(topic.type));
     }
     return found;
+  }
+
+  /// The definition that a file has of a topic. It is parsed once, however many topics share it.
+  const ParsedDefinition& definition_of(const bag::SourceTopic& topic) {
+    const auto [place, added] = parsed_.try_emplace({topic.schema.get(), topic.type});
+    ParsedDefinition& parsed = place->second;
+    if (added) {
+      parsed.text = topic.schema;
+      try {
+        RosDefinition definition = parse_ros_definition(topic.type, *topic.schema);
+        definition.origin = "the recording";
+        parsed.definition = std::make_shared<const RosDefinition>(std::move(definition));
+      } catch (const InputError& error) {
+        parsed.defect = error.what();
+      }
+    }
+    return parsed;
   }
 
   /// The bundled form that fits the first message, where there are several and there is one.
@@ -272,7 +308,13 @@ class Bag final : public BagReader {
   }
 
   bool unpack(BagMessage& message, const BagTopic& topic) {
-    if (const auto data = unpacker_.unpack(message.data)) {
+    packed_bytes_ += message.data.size();
+    if (const auto data = unpacker_.unpack(message.data, trust_)) {
+      unpacked_bytes_ += data->size();
+      if (!trust_ && unpacked_bytes_ > files::most_unpacked(packed_bytes_)) {
+        throw InputError(
+            fmt::format("{}: its messages: {}", files_[at_].path.string(), files::too_much_unpacked(packed_bytes_)));
+      }
       message.data = *data;
       return true;
     }
@@ -285,6 +327,7 @@ class Bag final : public BagReader {
   bool hashed_;
   bool trust_;
   std::vector<RosDefinitions> definitions_;
+  std::map<std::pair<const std::string*, std::string>, ParsedDefinition> parsed_;  ///< by text and type
   std::vector<File> files_;
   std::vector<BagReport> opened_;  ///< as they were before reading
 
@@ -297,6 +340,8 @@ class Bag final : public BagReader {
   mutable std::vector<BagReport> reports_;
   bag::MessageUnpacker unpacker_;
   std::uint64_t unpacked_wrong_ = 0;
+  std::uint64_t packed_bytes_ = 0;    ///< of the packed messages of the file that is being read
+  std::uint64_t unpacked_bytes_ = 0;  ///< what came out of them
   std::string first_wrong_;
 };
 
@@ -353,7 +398,7 @@ class PackedSource final : public Source {
     unpack(path, options);
     const std::string name = shown_ + " (unpacked)";
     switch (content_of(file_)) {
-      case Content::mcap: source_ = open_mcap(file_, name, {}); break;
+      case Content::mcap: source_ = open_mcap(file_, name, {.trust = options.trust, .stored = bytes_}); break;
       case Content::sqlite: source_ = open_sqlite(file_, name, {.trust = options.trust}); break;
       default:
         throw InputError(
@@ -393,18 +438,20 @@ class PackedSource final : public Source {
       }
     };
     check(to != nullptr);
-    const auto from = files::open_bytes(path, options.hashed);
+    const auto from = files::open_bytes(path, options.hashed, true);
+    bytes_ = std::filesystem::file_size(path);
+    const std::uint64_t most = std::min<std::uint64_t>(largest_copy, files::most_unpacked(bytes_));
     std::vector<char> buffer(bag_piece);
     std::uint64_t unpacked = 0;
     bool limit = false;
     try {
       while (const std::size_t got = from->read(buffer.data(), buffer.size())) {
-        check(std::fwrite(buffer.data(), 1, got, to.get()) == got);
         unpacked += got;
-        if (unpacked > largest_unpacked && !options.trust) {
+        if (unpacked > most && !options.trust) {
           limit = true;
           break;
         }
+        check(std::fwrite(buffer.data(), 1, got, to.get()) == got);
       }
     } catch (const InputError& error) {
       if (unpacked == 0 || std::ferror(to.get()) != 0) {
@@ -414,11 +461,13 @@ class PackedSource final : public Source {
                           from->file_bytes(), unpacked);
     }
     if (limit) {
-      throw InputError(fmt::format("{}: more than {} bytes come out of it: expected a smaller recording, or --trust",
-                                   shown_, largest_unpacked));
+      throw InputError(
+          most < files::most_unpacked(bytes_)
+              ? fmt::format("{}: more than {} bytes come out of it: expected a smaller recording, or --trust", shown_,
+                            largest_copy)
+              : shown_ + ": " + files::too_much_unpacked(bytes_));
     }
     check(std::fflush(to.get()) == 0);
-    bytes_ = std::filesystem::file_size(path);
     if (options.hashed) {
       mcap::WindowedFile file(path, true);
       file.leave(file.size());
@@ -446,12 +495,15 @@ Content content_of(const std::filesystem::path& path) {
   return start.empty()                                                  ? Content::empty
          : start.starts_with(mcap::magic.substr(0, 5))                  ? Content::mcap
          : start.starts_with(std::string_view("SQLite format 3\0", 16)) ? Content::sqlite
-         : start.starts_with("\x28\xB5\x2F\xFD")                        ? Content::zstd
+         : files::is_zstd(start)                                        ? Content::zstd
                                                                         : Content::other;
 }
 
 std::unique_ptr<Source> open_source(const std::filesystem::path& path, const SourceOptions& options) {
   const std::string name = path.string();
+  if (!options.trust) {
+    refuse_holes(path);
+  }
   switch (content_of(path)) {
     case Content::mcap: return open_mcap(path, name, options);
     case Content::sqlite: return open_sqlite(path, name, options);

@@ -18,12 +18,13 @@ namespace wheelwright::logs {
 
 /// A stream of messages of one type.
 struct BagTopic {
-  std::string name;                         ///< e.g. "/joint_states"
-  std::string type;                         ///< "pkg/msg/Type"
-  std::string encoding;                     ///< of its messages; only "cdr" can be read
-  std::optional<RosDefinition> definition;  ///< of the recording, else of BagOptions::msg_path, else bundled
-  std::string no_definition;                ///< why there is none, and what to do; empty where there is one
-  std::uint64_t messages = 0;               ///< handed out so far
+  std::string name;      ///< e.g. "/joint_states"
+  std::string type;      ///< "pkg/msg/Type"
+  std::string encoding;  ///< of its messages; only "cdr" can be read
+  /// Of the recording, else of BagOptions::msg_path, else bundled; topics may share one. Null where there is none.
+  std::shared_ptr<const RosDefinition> definition;
+  std::string no_definition;   ///< why there is none, and what to do; empty where there is one
+  std::uint64_t messages = 0;  ///< handed out so far
 };
 
 /// One message.
@@ -93,9 +94,9 @@ namespace wheelwright::logs::bag {
 struct SourceTopic {
   std::string name;
   std::string type;
-  std::string encoding;         ///< of its messages, e.g. "cdr"
-  std::string schema_encoding;  ///< of `schema`, e.g. "ros2msg"; empty where there is none
-  std::string schema;
+  std::string encoding;                       ///< of its messages, e.g. "cdr"
+  std::string schema_encoding;                ///< of `schema`, e.g. "ros2msg"; empty where there is none
+  std::shared_ptr<const std::string> schema;  ///< its text, which topics share; null where there is none
 };
 
 /// A file that is being read.
@@ -110,7 +111,7 @@ class Source {
   virtual void rewind() = 0;
   /// What was met so far.
   [[nodiscard]] virtual BagReport report() const = 0;
-  /// The first message on a topic, where it is cheap to say; does not move.
+  /// The first message on a topic, where it is cheap to say (also the hundredth time); does not move.
   [[nodiscard]] virtual std::optional<std::string> first_message(std::size_t topic);
 };
 
@@ -122,8 +123,9 @@ enum class Content { empty, mcap, sqlite, zstd, other };
 
 /// How to open a file.
 struct SourceOptions {
-  bool hashed = false;  ///< whether BagReport::hash is wanted
-  bool trust = false;   ///< see LogOptions::trust
+  bool hashed = false;       ///< whether BagReport::hash is wanted
+  bool trust = false;        ///< see LogOptions::trust
+  std::uint64_t stored = 0;  ///< bytes of the file that this one was unpacked from; 0 where it was not
 };
 
 /// Opens an MCAP file. `shown` is its name in sentences.
@@ -133,8 +135,8 @@ struct SourceOptions {
 /// says: tables with generated columns, virtual tables.
 [[nodiscard]] std::unique_ptr<Source> open_sqlite(const std::filesystem::path& path, const std::string& shown,
                                                   const SourceOptions& options);
-/// Opens a file, unpacking it where it is packed with zstd. Throws InputError as they do, and without trust where more
-/// than `largest_unpacked` bytes come out.
+/// Opens a file, unpacking it where it is packed with zstd. Throws InputError as they do, and without trust for a file
+/// of holes (refuse_holes()) and where more than files::most_unpacked() or `largest_copy` bytes come out.
 [[nodiscard]] std::unique_ptr<Source> open_source(const std::filesystem::path& path, const SourceOptions& options);
 
 /// "1700000000.123456789 s" of a time in ns.

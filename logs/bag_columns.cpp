@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <cstdlib>
+#include <map>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -20,6 +21,7 @@ namespace wheelwright::logs {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr std::size_t most_listed = 20'000;  ///< numbers of a recording that are named in its report
 
 std::int64_t quantile_of(std::vector<std::int64_t> values, double share) {
   if (values.empty()) {
@@ -135,11 +137,16 @@ class Chooser {
   [[nodiscard]] const BagTopic& topic(std::size_t k) const { return *topics_[k].topic; }
 
   void list_fields(std::size_t k) {
-    if (!topic(k).definition) {
+    if (!topic(k).definition || choice_.header.size() >= most_listed) {
       return;
     }
-    for (const std::string& field : numeric_paths(*topic(k).definition)) {
+    for (const std::string& field : numeric_paths(*topic(k).definition, most_listed - choice_.header.size())) {
       choice_.header.push_back(topic(k).name + "." + field);
+    }
+    if (choice_.header.size() >= most_listed) {
+      choice_.notes.push_back(
+          fmt::format("its topics have many numbers: the first {} are listed, up to those of {}; --map takes any",
+                      most_listed, topic(k).name));
     }
   }
 
@@ -232,13 +239,27 @@ class Chooser {
       offer(k, "gyro_z", {"angular_velocity.z"}, 1);
       offer(k, "accel_x", {"linear_acceleration.x"}, 1);
     } else if (!is_of_ros(type)) {
-      for (const std::string& field : numeric_paths(*own.definition)) {
-        const LogColumn* column = contains(field, ".") || contains(field, "[") ? nullptr : recognise_log_column(field);
+      for (const auto& [column, field] : recognised_in(own.definition.get())) {
+        offer(k, column->name, {field}, 0);
+      }
+    }
+  }
+
+  using Recognised = std::vector<std::pair<const LogColumn*, std::string>>;
+
+  /// The columns that fields of a definition are by their names; looked for once, however many topics share it.
+  const Recognised& recognised_in(const RosDefinition* definition) {
+    const auto [place, added] = recognised_.try_emplace(definition);
+    if (added) {
+      for (const RosField& field : definition->messages.front().fields) {
+        const bool number = field.shape == RosShape::single && ros::size_of(field.kind) > 0;
+        const LogColumn* column = number ? recognise_log_column(field.name) : nullptr;
         if (column != nullptr && column->name != "t") {
-          offer(k, column->name, {field}, 0);
+          place->second.emplace_back(column, field.name);
         }
       }
     }
+    return place->second;
   }
 
   static bool is_of_ros(const std::string& type) {
@@ -390,6 +411,7 @@ class Chooser {
   BagChoice choice_;
   std::vector<Offer> offers_;
   std::vector<std::string> taken_;
+  std::map<const RosDefinition*, Recognised> recognised_;
 };
 
 }  // namespace

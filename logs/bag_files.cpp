@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/logs/bag_files.hpp>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,7 +30,43 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Bytes of a file that are stored; `enough` where they are as many, where the file system does not tell, and where they
+/// lie in so many pieces that somebody wrote them.
+off_t stored_bytes(int file, off_t enough) {
+  constexpr int most_pieces = 100'000;
+  off_t stored = 0, at = 0;
+  for (int piece = 0; piece < most_pieces && stored < enough; ++piece) {
+    const off_t begin = ::lseek(file, at, SEEK_DATA);
+    if (begin < 0) {
+      return errno == ENXIO ? stored : enough;  // nothing is stored behind
+    }
+    at = ::lseek(file, begin, SEEK_HOLE);
+    if (at <= begin) {
+      return enough;
+    }
+    stored += at - begin;
+  }
+  return enough;
+}
+
 }  // namespace
+
+void refuse_holes(const fs::path& path) {
+  constexpr off_t always_read = off_t{1} << 26, largest_ratio = 100;
+  const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0) {
+    return;  // who reads it says so
+  }
+  const off_t size = ::lseek(file, 0, SEEK_END), enough = size / largest_ratio;
+  const off_t stored = size > always_read ? stored_bytes(file, enough) : enough;
+  ::close(file);
+  if (stored < enough) {
+    throw InputError(
+        fmt::format("{}: has {} bytes, of which {} are stored and the others are holes: expected a file that was "
+                    "written, or --trust",
+                    path.string(), size, stored));
+  }
+}
 
 std::string storage_ending(const fs::path& given) {
   fs::path name = given;
@@ -41,11 +78,12 @@ std::string storage_ending(const fs::path& given) {
 
 namespace {
 
-/// Throws unless `file` is below `directory` when all links are followed. One that is missing is told later.
-void stays_in(const fs::path& directory, const fs::path& file) {
+/// Throws unless `file` is below `home`, a directory without links, when all links are followed. One that is missing is
+/// told later.
+void stays_in(const fs::path& home, const fs::path& file) {
   std::error_code error;
-  const fs::path home = fs::canonical(directory, error), real = error ? fs::path() : fs::canonical(file, error);
-  if (error) {
+  const fs::path real = fs::canonical(file, error);
+  if (error || home.empty()) {
     return;
   }
   if (std::mismatch(home.begin(), home.end(), real.begin(), real.end()).first != home.end()) {
@@ -74,17 +112,18 @@ Parts parts_of(const fs::path& path, bool trust) {
     return parts;
   }
   const fs::path metadata = path / "metadata.yaml";
+  const fs::path home = fs::canonical(path, error);
   const auto check_links = [&] {
     for (const Part& part : parts.files) {
       if (!trust) {
-        stays_in(path, part.path);
+        stays_in(home, part.path);
       }
     }
   };
   if (fs::exists(metadata, error)) {
     parts.metadata = metadata.string();
     if (!trust) {
-      stays_in(path, metadata);
+      stays_in(home, metadata);
     }
     std::optional<Metadata> found;
     try {
@@ -141,7 +180,8 @@ Parts parts_of(const fs::path& path, bool trust) {
 
 namespace {
 
-constexpr std::size_t longest_metadata = std::size_t{1} << 26;
+constexpr std::size_t longest_metadata = std::size_t{1} << 24;
+constexpr std::size_t most_files = 10'000;
 
 [[noreturn]] void fail(const std::string& name, const YAML::Mark& mark, const std::string& what) {
   throw InputError(mark.is_null() ? fmt::format("{}: {}", name, what)
@@ -169,6 +209,10 @@ Metadata read_metadata(const std::filesystem::path& path) {
     const YAML::Node files = information["relative_file_paths"];
     if (!files.IsDefined() || !files.IsSequence() || files.size() == 0) {
       fail(name, information.Mark(), "relative_file_paths: expected a list of at least one file");
+    }
+    if (files.size() > most_files) {
+      fail(name, files.Mark(),
+           fmt::format("relative_file_paths: {} files: expected at most {}", files.size(), most_files));
     }
     for (const YAML::Node& file : files) {
       if (!file.IsScalar() || file.Scalar().empty()) {
@@ -216,6 +260,8 @@ std::unique_ptr<files::Temporary> temporary_directory() {
 namespace {
 
 constexpr std::size_t longest = std::size_t{1} << 29;
+constexpr std::size_t always_long = std::size_t{1} << 25;
+constexpr std::size_t largest_ratio = 100;
 
 struct Free {
   void operator()(ZSTD_DStream* stream) const { ZSTD_freeDStream(stream); }
@@ -235,7 +281,8 @@ MessageUnpacker& MessageUnpacker::operator=(MessageUnpacker&&) noexcept = defaul
 
 bool is_packed(std::string_view data) { return data.starts_with("\x28\xB5\x2F\xFD"); }
 
-std::optional<std::string_view> MessageUnpacker::unpack(std::string_view data) {
+std::optional<std::string_view> MessageUnpacker::unpack(std::string_view data, bool trust) {
+  const std::size_t most = trust ? longest : std::min(longest, std::max(always_long, largest_ratio * data.size()));
   if (!impl_->stream) {
     impl_->stream.reset(ZSTD_createDStream());
     if (!impl_->stream) {
@@ -261,10 +308,10 @@ std::optional<std::string_view> MessageUnpacker::unpack(std::string_view data) {
       return std::nullopt;
     }
     if (!room) {
-      if (impl_->bytes.size() >= longest) {
+      if (impl_->bytes.size() >= most) {
         return std::nullopt;
       }
-      impl_->bytes.resize(std::min(longest, 2 * impl_->bytes.size()));
+      impl_->bytes.resize(std::min(most, 2 * impl_->bytes.size()));
     }
   }
 }

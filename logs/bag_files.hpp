@@ -17,8 +17,13 @@ namespace wheelwright::logs::bag {
 
 /// Bytes of the largest journal of a database that is copied without LogOptions::trust.
 inline constexpr std::uintmax_t largest_journal = std::uintmax_t{4} << 30;
-/// Bytes that a packed recording may have unpacked without LogOptions::trust.
-inline constexpr std::uintmax_t largest_unpacked = std::uintmax_t{16} << 30;
+/// Bytes of the largest database that is copied, and of what a packed recording may have unpacked, without
+/// LogOptions::trust.
+inline constexpr std::uintmax_t largest_copy = std::uintmax_t{16} << 30;
+
+/// Throws InputError where a file of more than 64 MiB consists of holes but for a hundredth, which would be read as
+/// zeros for as long as it says.
+void refuse_holes(const std::filesystem::path& path);
 
 /// A file to be read.
 struct Part {
@@ -49,7 +54,8 @@ struct Metadata {
   std::optional<std::uint64_t> messages;  ///< in all files
 };
 
-/// Reads `path`. Throws InputError, naming file and line, when it is no YAML or names no file.
+/// Reads `path`. Throws InputError, naming file and line, when it is no YAML, names no file or more than 10,000, or has
+/// more than 16 MiB.
 [[nodiscard]] Metadata read_metadata(const std::filesystem::path& path);
 
 /// A topic that was written.
@@ -87,9 +93,9 @@ class MessageUnpacker {
   MessageUnpacker(MessageUnpacker&&) noexcept;
   MessageUnpacker& operator=(MessageUnpacker&&) noexcept;
 
-  /// The message, until the next call; nothing where it is damaged, cut off or longer than 512 MiB. Memory grows with
-  /// what comes out, not with what the frame says.
-  std::optional<std::string_view> unpack(std::string_view data);
+  /// The message, until the next call; nothing where it is damaged, cut off or longer than 512 MiB, or, without
+  /// `trust`, than 32 MiB and than 100 times `data`. Memory grows with what comes out, not with what the frame says.
+  std::optional<std::string_view> unpack(std::string_view data, bool trust = false);
 
  private:
   struct Impl;

@@ -455,14 +455,21 @@ class BagFile final : public RowFile {
  private:
   [[nodiscard]] std::string nothing_in(const BagReader& bag, const LogOptions& options) const {
     std::string message = plan_.path.string() + ": no topic has a column of a log";
+    std::string loss;
+    for (const BagReport& report : bag.reports()) {
+      if (loss.empty() && !report.losses.empty()) {
+        loss = "; " + report.losses.front();
+      }
+    }
     if (bag.topics().empty()) {
-      return message + ": there is no message in it";
+      return message + ": there is no message in it" + loss;
     }
     message += ": it has";
     for (const BagTopic& topic : bag.topics()) {
       message += fmt::format("{} {} ({}{})", &topic == &bag.topics().front() ? "" : ",", topic.name, topic.type,
                              topic.definition ? "" : ": " + topic.no_definition);
     }
+    message += loss;
     for (const std::string& note : plan_.choice.notes) {
       message += "; " + note;
     }

@@ -25,7 +25,8 @@ namespace {
 class McapSource final : public Source {
  public:
   McapSource(const std::filesystem::path& path, std::string shown, const SourceOptions& options)
-      : reader_(path, {.hashed = options.hashed}), shown_(std::move(shown)) {
+      : reader_(path, {.hashed = options.hashed, .trust = options.trust, .stored = options.stored, .shown = shown}),
+        shown_(std::move(shown)) {
     for (const auto& [id, channel] : reader_.channels()) {
       topic_of(id);
     }
@@ -70,15 +71,24 @@ class McapSource final : public Source {
       const McapChannel& own = reader_.channels().at(channel);
       const McapSchema* const schema = reader_.schema_of(own);
       topics_.push_back({own.topic, schema != nullptr ? full_ros_name(schema->name) : "", own.message_encoding,
-                         schema != nullptr ? schema->encoding : "", schema != nullptr ? schema->text : ""});
+                         schema != nullptr ? schema->encoding : "", schema != nullptr ? text_of(*schema) : nullptr});
     }
     return place->second;
+  }
+
+  std::shared_ptr<const std::string> text_of(const McapSchema& schema) {
+    auto& text = texts_[schema.id];
+    if (text == nullptr) {
+      text = std::make_shared<const std::string>(schema.text);
+    }
+    return text;
   }
 
   McapReader reader_;
   std::string shown_;
   std::vector<SourceTopic> topics_;
   std::map<std::uint16_t, std::size_t> places_;
+  std::map<std::uint16_t, std::shared_ptr<const std::string>> texts_;  ///< of the schemas
   std::uint64_t late_ = 0;
   std::uint64_t messages_ = 0;
 };
@@ -96,6 +106,8 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t most_losses = 1000;
 constexpr std::size_t most_unknown = 100;
+constexpr std::uint64_t always_stepped = 20'000'000, steps_a_byte = 10;
+constexpr std::size_t most_asked = 100;  ///< first messages, each of which may cost a walk through the table
 constexpr std::int64_t any_other = std::numeric_limits<std::int64_t>::min();
 constexpr const char* from_row =
     "SELECT rowid, topic_id, timestamp, data FROM messages WHERE rowid >= ?1 ORDER BY rowid";
@@ -115,6 +127,13 @@ class SqliteSource final : public Source {
         file_(path, shown_, options.trust),
         database_(file_.path(), shown_, file_.has_journal() ? Database::Mode::recovering : Database::Mode::unchanging) {
     bytes_ = fs::file_size(path);
+    read_bytes_ = bytes_;
+    for (const char* const ending : {"-wal", "-journal"}) {
+      std::error_code none;
+      const std::uintmax_t more = fs::file_size(fs::path(path) += ending, none);
+      read_bytes_ += none ? 0 : more;
+    }
+    bound();
     if (options.hashed) {
       mcap::WindowedFile file(path, true);
       file.leave(file.size());
@@ -149,8 +168,9 @@ class SqliteSource final : public Source {
   }
 
   void rewind() override {
+    bound();
     losses_ = found_;
-    messages_ = met_ = sum_ = foreign_ = 0;
+    messages_ = met_ = sum_ = foreign_ = handed_ = 0;
     unknown_.clear();
     first_row_ = last_row_ = last_time_ = 0;
     damaged_ = !found_.empty();
@@ -175,6 +195,16 @@ class SqliteSource final : public Source {
   }
 
   [[nodiscard]] std::optional<std::string> first_message(std::size_t topic) override {
+    if (++asked_ > most_asked) {
+      return std::nullopt;
+    }
+    std::optional<std::string> message = message_of(topic);
+    bound();  // what this took is not taken from reading
+    return message;
+  }
+
+ private:
+  std::optional<std::string> message_of(std::size_t topic) const {
     for (const auto& [id, place] : places_) {
       if (place == topic) {
         Statement statement = database_.prepare("SELECT data FROM messages WHERE topic_id = ?1 LIMIT 1");
@@ -190,7 +220,9 @@ class SqliteSource final : public Source {
     return std::nullopt;
   }
 
- private:
+  /// A row of rosbag2 has more bytes than reading it takes steps.
+  void bound() { database_.bound(always_stepped + steps_a_byte * read_bytes_); }
+
   void lose(std::string what) {
     damaged_ = true;
     if (losses_.size() < most_losses) {
@@ -258,7 +290,8 @@ class SqliteSource final : public Source {
     Statement::Result result;
     while ((result = rows.step()) == Statement::Result::row) {
       if (places_.try_emplace(rows.integer(0), topics_.size()).second) {
-        topics_.push_back({std::string(rows.text(1)), full_ros_name(rows.text(2)), std::string(rows.text(3)), "", ""});
+        topics_.push_back(
+            {std::string(rows.text(1)), full_ros_name(rows.text(2)), std::string(rows.text(3)), "", nullptr});
       }
     }
     if (result == Statement::Result::failed) {
@@ -272,14 +305,20 @@ class SqliteSource final : public Source {
     }
     Statement rows =
         database_.prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions");
+    struct Definition {
+      std::string encoding;
+      std::shared_ptr<const std::string> text;
+    };
+    std::map<std::string, Definition> found;
     Statement::Result result = Statement::Result::failed;
     while (rows.ok() && (result = rows.step()) == Statement::Result::row) {
-      const std::string type = full_ros_name(rows.text(0));
-      for (SourceTopic& topic : topics_) {
-        if (topic.type == type) {
-          topic.schema_encoding = rows.text(1);
-          topic.schema = rows.text(2);
-        }
+      found[full_ros_name(rows.text(0))] = {std::string(rows.text(1)),
+                                            std::make_shared<const std::string>(rows.text(2))};
+    }
+    for (SourceTopic& topic : topics_) {
+      if (const auto definition = found.find(topic.type); definition != found.end()) {
+        topic.schema_encoding = definition->second.encoding;
+        topic.schema = definition->second.text;
       }
     }
     if (result == Statement::Result::failed) {
@@ -312,6 +351,15 @@ class SqliteSource final : public Source {
     const auto data = rows_.blob(3);
     if (!rows_.is_integer(1) || !rows_.is_integer(2) || !data) {
       ++foreign_;
+      return false;
+    }
+    handed_ += data->size();
+    if (handed_ > read_bytes_) {
+      lose(
+          fmt::format("table messages: up to row {} it has more bytes than its file: its rows share them; the rest is "
+                      "not read",
+                      row));
+      finished_ = true;
       return false;
     }
     const std::int64_t time = rows_.integer(2);
@@ -412,9 +460,11 @@ class SqliteSource final : public Source {
   DatabaseFile file_;
   Database database_;
   std::uint64_t bytes_ = 0;
+  std::uint64_t read_bytes_ = 0;  ///< with those of journals
   std::string hash_;
   bool defined_ = false;
   std::vector<SourceTopic> topics_;
+  std::size_t asked_ = 0;                       ///< for first messages
   std::map<std::int64_t, std::size_t> places_;  ///< of topics by their id
   std::vector<std::string> found_;              ///< losses that were found on opening
 
@@ -424,6 +474,7 @@ class SqliteSource final : public Source {
   std::uint64_t met_ = 0;       ///< rows
   std::uint64_t sum_ = 0;       ///< of mixed() over them
   std::uint64_t foreign_ = 0;   ///< rows with columns of other types
+  std::uint64_t handed_ = 0;    ///< bytes of all messages
   std::map<std::int64_t, std::uint64_t> unknown_;
   std::int64_t first_row_ = 0, last_row_ = 0, last_time_ = 0;
   bool damaged_ = false;

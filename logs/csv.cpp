@@ -24,7 +24,8 @@ constexpr std::size_t rows_looked_at = 5000;  ///< rows at the beginning of a fi
 
 /// Content lines of one file behind its header.
 struct FileWalk {
-  FileWalk(const std::filesystem::path& path, bool hashed) : lines(files::open_bytes(path, hashed), path.string()) {}
+  FileWalk(const std::filesystem::path& path, bool hashed, bool trust)
+      : lines(files::open_bytes(path, hashed, trust), path.string()) {}
 
   bool next(std::string_view& line) {
     while (lines.next(line)) {
@@ -99,7 +100,7 @@ class CsvWalk final : public RowWalk {
  public:
   CsvWalk(const std::filesystem::path& path, const CsvOptions& options, const std::vector<std::string>& names,
           double longest_step, LogReport* report)
-      : names_(names), rows_(names, report), lines_(path, report != nullptr) {
+      : names_(names), rows_(names, report), lines_(path, report != nullptr, options.trust) {
     rows_.set_longest_step(longest_step);
     header_ = header_of(lines_, options, path.string());
     rows_.begin_file(header_, path.string());
@@ -133,7 +134,7 @@ class MergedCsvWalk final : public RowWalk {
         streams_(streams),
         rows_(names, report),
         cleaner_(names, report),
-        lines_(path, report != nullptr),
+        lines_(path, report != nullptr, options.trust),
         row_(names.size() + 1) {
     header_ = header_of(lines_, options, path.string());
     rows_.begin_file(header_, path.string());
@@ -255,7 +256,7 @@ class MergedCsvWalk final : public RowWalk {
 class CsvFile final : public RowFile {
  public:
   CsvFile(std::filesystem::path path, CsvOptions options) : path_(std::move(path)), options_(std::move(options)) {
-    FileWalk lines(path_, false);
+    FileWalk lines(path_, false, options_.trust);
     names_ = names_of(header_of(lines, options_, path_.string()));
   }
 
@@ -276,7 +277,7 @@ class CsvFile final : public RowFile {
   /// Streams of the first rows. What is wrong with one of them is left to the walk, which says so.
   void look_for_streams(const std::vector<std::string>& names) {
     CsvRowReader rows(names, nullptr);
-    FileWalk lines(path_, false);
+    FileWalk lines(path_, false, options_.trust);
     rows.begin_file(header_of(lines, options_, path_.string()), path_.string());
     rows.let_miss(std::vector<bool>(names.size(), true));
     CsvStreamFinder finder(names);

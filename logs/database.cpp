@@ -16,6 +16,65 @@
 namespace wheelwright::logs::bag {
 namespace {
 
+namespace fs = std::filesystem;
+
+/// What ends a rollback journal that names a super-journal (SQLite, "Database File Format", section 3).
+constexpr std::string_view journal_magic("\xd9\xd5\x05\xf9\x20\xa1\x63\xd7", 8);
+
+/// True if a journal names a super-journal, as far as SQLite is concerned: it looks at the end only.
+bool names_super_journal(std::istream& journal) {
+  std::string end(journal_magic.size(), '\0');
+  return journal.seekg(-static_cast<std::streamoff>(end.size()), std::ios::end) &&
+         journal.read(end.data(), static_cast<std::streamsize>(end.size())) && end == journal_magic;
+}
+
+/// Throws unless SQLite may do with the journals beside a database what it does: play them back, empty and delete them,
+/// and delete the super-journal that a rollback journal names. A database of this program is never part of a
+/// transaction over several, so its journal names none.
+void check_journals(const fs::path& database) {
+  for (const char* const ending : {"-journal", "-wal"}) {
+    fs::path beside = database;
+    beside += ending;
+    std::error_code error;
+    const fs::file_status status = fs::symlink_status(beside, error);
+    if (!fs::exists(status)) {
+      continue;
+    }
+    if (!fs::is_regular_file(status) || fs::hard_link_count(beside, error) > 1) {
+      throw InputError(
+          fmt::format("{}: is a link, or no file: expected a journal beside its database; remove it, or "
+                      "give another place",
+                      beside.string()));
+    }
+    std::ifstream journal(beside, std::ios::binary);
+    if (std::string_view(ending) == "-journal" && names_super_journal(journal)) {
+      throw InputError(
+          fmt::format("{}: names another file, which SQLite would delete: expected the journal of a "
+                      "database that this program wrote, which names none; remove it, or give another "
+                      "place",
+                      beside.string()));
+    }
+  }
+}
+
+/// What reading a foreign file takes: rows and what its tables are like. No function, no attached file, no change.
+int only_reading(void* /*data*/, int action, const char* what, const char* /*argument*/, const char* /*schema*/,
+                 const char* /*inner*/) {
+  const std::string_view name = what == nullptr ? "" : what;
+  const bool allowed = action == SQLITE_SELECT || action == SQLITE_READ ||
+                       (action == SQLITE_PRAGMA && (name == "table_list" || name == "table_xinfo"));
+  return allowed ? SQLITE_OK : SQLITE_DENY;
+}
+
+constexpr int steps_at_once = 10'000;
+
+/// What a file says is data, also where it may be one of ours.
+void distrust(sqlite3* database) {
+  sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+}
+
 /// `path` as SQLite's "file:" address.
 std::string address(const std::filesystem::path& path) {
   std::string text = "file:";
@@ -90,30 +149,56 @@ Database::Database(const std::filesystem::path& path, const std::string& shown, 
   if (result != SQLITE_OK) {
     throw InputError(fmt::format("{}: cannot be opened as an SQLite database ({})", shown, error()));
   }
+  if (mode != Mode::unchanging) {
+    // SQLite follows links to the database, and looks for its journals there.
+    const char* const real = sqlite3_db_filename(database, "main");
+    if (real != nullptr && *real != '\0') {
+      check_journals(real);
+    }
+  }
+  distrust(database);
   if (mode == Mode::writing) {
     return;
   }
   if (mode == Mode::keeping) {
+    sqlite3_db_config(database, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
     // Before the first look at the file: its write-ahead log then needs no memory shared between processes, which file
     // systems of clusters lack.
-    run("PRAGMA locking_mode=EXCLUSIVE; PRAGMA trusted_schema=OFF; PRAGMA cell_size_check=ON;");
+    run("PRAGMA locking_mode=EXCLUSIVE; PRAGMA cell_size_check=ON;");
     return;
   }
-  // What a foreign file says is data: nothing of it is run. With a writable schema SQLite reads files that are cut off
-  // up to their last whole page; nothing is written.
-  sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
-  sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
+  // With a writable schema SQLite reads files that are cut off up to their last whole page; nothing is written.
+  // Defensive mode would take that back.
   run("PRAGMA writable_schema=ON; PRAGMA cell_size_check=ON; PRAGMA temp_store=MEMORY;");
+  sqlite3_set_authorizer(database, only_reading, nullptr);
 }
 
 bool Database::run(const std::string& sql) {
   return sqlite3_exec(database_.get(), sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;
 }
 
+void Database::bound(std::uint64_t steps) {
+  if (left_ == nullptr) {
+    left_ = std::make_unique<std::uint64_t>();
+    sqlite3_progress_handler(
+        database_.get(), steps_at_once,
+        [](void* left) {
+          auto& units = *static_cast<std::uint64_t*>(left);
+          units -= units > 0 ? 1 : 0;
+          return units == 0 ? 1 : 0;
+        },
+        left_.get());
+  }
+  *left_ = steps / steps_at_once + 1;
+}
+
 void Database::forget() { sqlite3_db_release_memory(database_.get()); }
 
-std::string Database::error() const { return sqlite3_errmsg(database_.get()); }
+std::string Database::error() const {
+  return sqlite3_errcode(database_.get()) == SQLITE_INTERRUPT
+             ? "reading takes more steps than a sound table of this size: its pages lead to each other again and again"
+             : sqlite3_errmsg(database_.get());
+}
 
 bool Database::in_use() const {
   const int code = sqlite3_errcode(database_.get());
@@ -123,8 +208,6 @@ bool Database::in_use() const {
 bool Database::close() { return sqlite3_close(database_.release()) == SQLITE_OK; }
 
 namespace {
-
-namespace fs = std::filesystem;
 
 /// Bytes of the header of a database (SQLite, "Database File Format", section 1.3).
 constexpr std::size_t header_bytes = 100;
@@ -138,20 +221,14 @@ std::uint64_t number_at(const std::string& header, std::size_t at, std::size_t s
   return value;
 }
 
-/// What ends a rollback journal that names a super-journal (SQLite, "Database File Format", section 3).
-constexpr std::string_view journal_magic("\xd9\xd5\x05\xf9\x20\xa1\x63\xd7", 8);
-
 /// Takes the name of a super-journal off a copy of a journal: without its magic number it is none. What the journal
 /// holds is played back as if the transaction had not been finished, which leaves the database whole.
 void forget_super_journal(const fs::path& journal) {
   std::fstream file(journal, std::ios::in | std::ios::out | std::ios::binary);
-  std::string end(journal_magic.size(), '\0');
-  const auto at = -static_cast<std::streamoff>(end.size());
-  if (file.seekg(at, std::ios::end) && file.read(end.data(), static_cast<std::streamsize>(end.size())) &&
-      end == journal_magic) {
-    end.assign(end.size(), '\0');
-    file.seekp(at, std::ios::end);
-    file.write(end.data(), static_cast<std::streamsize>(end.size()));
+  if (names_super_journal(file)) {
+    const std::string none(journal_magic.size(), '\0');
+    file.seekp(-static_cast<std::streamoff>(none.size()), std::ios::end);
+    file.write(none.data(), static_cast<std::streamsize>(none.size()));
     file.flush();
     if (!file) {
       throw InputError(fmt::format("{}: cannot be written: expected room there", journal.string()));
@@ -162,11 +239,11 @@ void forget_super_journal(const fs::path& journal) {
 }  // namespace
 
 DatabaseFile::DatabaseFile(const fs::path& path, const std::string& shown, bool trust) : path_(path) {
-  find_end(path, shown);
+  find_end(path, shown, trust);
   find_journals(path, trust);
 }
 
-void DatabaseFile::find_end(const fs::path& original, const std::string& shown) {
+void DatabaseFile::find_end(const fs::path& original, const std::string& shown, bool trust) {
   mcap::WindowedFile file(original, false);
   const std::uint64_t size = file.size();
   const std::string header = file.peek(0, static_cast<std::size_t>(std::min<std::uint64_t>(header_bytes, size)));
@@ -186,7 +263,7 @@ void DatabaseFile::find_end(const fs::path& original, const std::string& shown) 
     defect_ = fmt::format("at byte {}: the file ends inside a page: it was cut off, or something follows it", size);
   }
   if (size % page != 0) {
-    copy(original, "bag.db3");
+    copy_database(original, trust);
     std::error_code error;
     fs::resize_file(path_, size - size % page, error);
     if (error) {
@@ -210,8 +287,11 @@ void DatabaseFile::find_journals(const fs::path& original, bool trust) {
         throw InputError(fmt::format("{}: has {} bytes, and would be copied: expected at most {}, or --trust",
                                      beside.string(), size, largest_journal));
       }
+      if (!trust) {
+        refuse_holes(beside);
+      }
       if (!directory_) {
-        copy(original, "bag.db3");
+        copy_database(original, trust);
       }
       const fs::path database = path_;
       copy(beside, (std::string("bag.db3") + ending).c_str());
@@ -223,6 +303,18 @@ void DatabaseFile::find_journals(const fs::path& original, bool trust) {
       defect_.clear();  // what is missing may be in the journal
     }
   }
+}
+
+void DatabaseFile::copy_database(const fs::path& from, bool trust) {
+  std::error_code error;
+  const auto size = fs::file_size(from, error);
+  if (!trust && !error && size > largest_copy) {
+    throw InputError(
+        fmt::format("{}: has {} bytes, and would be copied, since it was cut off or not closed: expected at most {}, "
+                    "or --trust",
+                    from.string(), size, largest_copy));
+  }
+  copy(from, "bag.db3");
 }
 
 void DatabaseFile::copy(const fs::path& from, const char* name) {

@@ -58,7 +58,8 @@ class Database {
   enum class Mode { unchanging, recovering, writing, keeping };
 
   /// With `keeping`, an empty path is a database that is gone when it is closed. Throws InputError, beginning with
-  /// `shown`, when it cannot be opened.
+  /// `shown`, when it cannot be opened; with every mode but `unchanging`, naming the journal, where one beside it is a
+  /// link or no file, or names a super-journal, which SQLite would delete.
   Database(const std::filesystem::path& path, const std::string& shown, Mode mode);
 
   [[nodiscard]] Statement prepare(std::string_view sql) const { return {database_.get(), sql}; }
@@ -67,6 +68,8 @@ class Database {
   /// Forgets pages that were read: SQLite examines a page when it reads it, and takes it for good from then on. No
   /// statement may be at a row.
   void forget();
+  /// From here on statements may take `steps` of SQLite's machine together; then they fail.
+  void bound(std::uint64_t steps);
   /// What went wrong last, in words.
   [[nodiscard]] std::string error() const;
   /// True if that was another process that has it open.
@@ -78,6 +81,7 @@ class Database {
   struct Close {
     void operator()(sqlite3* database) const;
   };
+  std::unique_ptr<std::uint64_t> left_;  ///< steps in units of `steps_at_once`; outlives the database, which counts it
   std::unique_ptr<sqlite3, Close> database_;
 };
 
@@ -87,9 +91,9 @@ class Database {
 class DatabaseFile {
  public:
   /// Looks at `path`; `shown` is its name in sentences. Throws InputError when it cannot be read or copied, ends inside
-  /// its header, or, without `trust`, where a journal is a link or larger than `largest_journal`. A rollback journal
-  /// names the super-journal of its transaction, which SQLite deletes when it has played the journal back: the copy
-  /// names none.
+  /// its header, or, without `trust`, where a journal is a link, larger than `largest_journal` or made of holes, and
+  /// where the copy of the database would be larger than `largest_copy`. A rollback journal names the super-journal
+  /// of its transaction, which SQLite deletes when it has played the journal back: the copy names none.
   DatabaseFile(const std::filesystem::path& path, const std::string& shown, bool trust = false);
 
   /// What to open.
@@ -101,7 +105,8 @@ class DatabaseFile {
 
  private:
   void find_journals(const std::filesystem::path& original, bool trust);
-  void find_end(const std::filesystem::path& original, const std::string& shown);
+  void find_end(const std::filesystem::path& original, const std::string& shown, bool trust);
+  void copy_database(const std::filesystem::path& from, bool trust);
   void copy(const std::filesystem::path& from, const char* name);
 
   std::filesystem::path path_;

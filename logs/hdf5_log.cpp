@@ -17,6 +17,7 @@
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
+#include <wheelwright/logs/bag_files.hpp>
 #include <wheelwright/logs/hdf5_header.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
@@ -32,7 +33,9 @@ constexpr std::size_t rows_at_once = 8192;
 constexpr std::size_t most_objects = 100000;
 constexpr std::ptrdiff_t deepest_group = 64;
 constexpr hsize_t most_rows = hsize_t{1} << 32;
-constexpr hsize_t largest_chunk = hsize_t{1} << 28;  // bytes; the library holds a chunk of each column
+constexpr hsize_t largest_chunk = hsize_t{1} << 25;  // bytes; the library holds a chunk of each column
+constexpr hsize_t cached_chunks = hsize_t{1} << 20;  // bytes that the library keeps unasked
+constexpr std::uint64_t always_pieces = std::uint64_t{1} << 16, bytes_a_piece = 8;
 
 /// One column that a file has: a dataset, or a member of one of a compound type.
 struct Source {
@@ -40,6 +43,7 @@ struct Source {
   std::string member;  ///< empty for a plain dataset
   std::string unit;
   hsize_t rows = 0;
+  hsize_t chunk = 0;      ///< bytes of one, 0 where it is not stored in chunks
   std::string refused{};  ///< why it is not read, without a subject; empty where it is
   double factor = 1.0;    ///< by which its values are multiplied
 
@@ -109,9 +113,15 @@ std::optional<std::string> unit_of(hid_t dataset) {
   return "";
 }
 
+/// Bytes of the file.
+std::uint64_t size_of(hid_t file) {
+  hsize_t size = 0;
+  return H5Fget_filesize(file, &size) < 0 ? 0 : size;
+}
+
 /// Why a dataset is not read: what it says of its place is followed with trust only, and its size must be one that a
-/// log has.
-std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust) {
+/// log has. `chunk` becomes the bytes of a chunk.
+std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t& chunk) {
   const Handle how(H5Dget_create_plist(dataset), H5Pclose);
   const H5D_layout_t layout = how ? H5Pget_layout(how.get()) : H5D_LAYOUT_ERROR;
   if (!how || layout == H5D_LAYOUT_ERROR) {
@@ -123,9 +133,17 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust) {
   if (!trust && H5Pget_external_count(how.get()) > 0) {
     return "has its values in another file: expected them in this file, or --trust";
   }
-  hsize_t chunk = 0;
-  if (layout == H5D_CHUNKED && (H5Pget_chunk(how.get(), 1, &chunk) != 1 || chunk > largest_chunk / H5Tget_size(type))) {
-    return fmt::format("is stored in pieces of {} values: expected at most {} bytes in one", chunk, largest_chunk);
+  hsize_t piece = 0;
+  if (layout == H5D_CHUNKED && (H5Pget_chunk(how.get(), 1, &piece) != 1 || piece > largest_chunk / H5Tget_size(type))) {
+    return fmt::format("is stored in pieces of {} values: expected at most {} bytes in one", piece, largest_chunk);
+  }
+  chunk = piece * H5Tget_size(type);
+  const Handle file(H5Iget_file_id(dataset), H5Fclose);
+  if (!trust && piece > 0 && rows / piece > always_pieces + size_of(file.get()) / bytes_a_piece) {
+    return fmt::format(
+        "has {} values in pieces of {}, more pieces than its file of {} bytes has room for: expected pieces that were "
+        "written, or --trust",
+        rows, piece, size_of(file.get()));
   }
   if (rows > most_rows) {
     return fmt::format("has {} values: expected at most {}", rows, most_rows);
@@ -140,14 +158,14 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust) {
 void list_dataset(hid_t file, const std::string& path, const std::string& defect, bool trust,
                   std::vector<Source>& sources) {
   if (!defect.empty()) {
-    sources.push_back({path, "", "", 0, defect});
+    sources.push_back({path, "", "", 0, 0, defect});
     return;
   }
   const Handle dataset(H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose);
   const Handle space(dataset ? H5Dget_space(dataset.get()) : -1, H5Sclose);
   const Handle type(dataset ? H5Dget_type(dataset.get()) : -1, H5Tclose);
   if (!dataset || !space || !type) {
-    sources.push_back({path, "", "", 0, "cannot be opened by the HDF5 library: the file is damaged"});
+    sources.push_back({path, "", "", 0, 0, "cannot be opened by the HDF5 library: the file is damaged"});
     return;
   }
   if (H5Sget_simple_extent_ndims(space.get()) != 1) {
@@ -155,10 +173,11 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
   }
   hsize_t rows = 0;
   H5Sget_simple_extent_dims(space.get(), &rows, nullptr);
-  const std::string refused = refusal(dataset.get(), type.get(), rows, trust);
+  hsize_t chunk = 0;
+  const std::string refused = refusal(dataset.get(), type.get(), rows, trust, chunk);
   if (is_number(type.get())) {
     const std::optional<std::string> unit = unit_of(dataset.get());
-    sources.push_back({path, "", unit.value_or(""), rows, unit ? refused : "has damaged attributes"});
+    sources.push_back({path, "", unit.value_or(""), rows, chunk, unit ? refused : "has damaged attributes"});
   } else if (H5Tget_class(type.get()) == H5T_COMPOUND) {
     const int members = H5Tget_nmembers(type.get());
     for (int k = 0; k < members; ++k) {
@@ -169,7 +188,7 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
       const bool inside =
           member && H5Tget_member_offset(type.get(), index) + H5Tget_size(member.get()) <= H5Tget_size(type.get());
       if (inside && name != nullptr && is_number(member.get())) {
-        sources.push_back({path, name, "", rows, refused});
+        sources.push_back({path, name, "", rows, chunk, refused});
       }
       H5free_memory(name);
     }
@@ -219,7 +238,7 @@ class ColumnReader {
   ColumnReader(hid_t file, const Source& source, std::string where)
       : where_(std::move(where)),
         rows_(source.rows),
-        dataset_(H5Dopen2(file, source.path.c_str(), H5P_DEFAULT), H5Dclose) {
+        dataset_(H5Dopen2(file, source.path.c_str(), access_to(source).get()), H5Dclose) {
     if (source.member.empty()) {
       type_ = Handle(H5Tcopy(H5T_NATIVE_DOUBLE), H5Tclose);
     } else {
@@ -237,6 +256,18 @@ class ColumnReader {
   }
 
  private:
+  /// The library unpacks a chunk again for each piece of rows unless its cache holds it; members of a dataset are read
+  /// in turn, also where their rows lie in two chunks.
+  static Handle access_to(const Source& source) {
+    Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
+    const hsize_t wanted = source.member.empty() ? source.chunk : 2 * source.chunk;
+    if (wanted > cached_chunks) {
+      H5Pset_chunk_cache(access.get(), H5D_CHUNK_CACHE_NSLOTS_DEFAULT, static_cast<std::size_t>(wanted),
+                         H5D_CHUNK_CACHE_W0_DEFAULT);
+    }
+    return access;
+  }
+
   void fill(hsize_t row) {
     const hsize_t count = std::min<hsize_t>(rows_at_once, rows_ - row);
     values_.resize(static_cast<std::size_t>(count));
@@ -269,8 +300,9 @@ struct Choice {
 
 class DatasetChooser {
  public:
-  DatasetChooser(const std::string& path, const LogOptions& options, std::vector<Source> sources)
-      : path_(path), options_(options), sources_(std::move(sources)) {}
+  DatasetChooser(const std::string& path, const LogOptions& options, std::vector<Source> sources,
+                 std::uint64_t file_bytes)
+      : path_(path), options_(options), sources_(std::move(sources)), file_bytes_(file_bytes) {}
 
   Choice choose() {
     for (const Source& source : sources_) {
@@ -289,6 +321,7 @@ class DatasetChooser {
       take(name, named(name, home, name));
     }
     same_length();
+    check_size();
     return std::move(choice_);
   }
 
@@ -395,9 +428,20 @@ class DatasetChooser {
     }
   }
 
+  /// Values that were never written, or pack too well, cost as much as others.
+  void check_size() const {
+    const hsize_t rows = choice_.found.at("t").rows;
+    const std::uint64_t columns = choice_.found.size(), most = files::most_unpacked(file_bytes_);
+    if (!options_.trust && rows > most / sizeof(double) / columns) {
+      throw InputError(
+          fmt::format("{}: {} columns of {} rows: {}", path_, columns, rows, files::too_much_unpacked(file_bytes_)));
+    }
+  }
+
   const std::string& path_;
   const LogOptions& options_;
   std::vector<Source> sources_;
+  std::uint64_t file_bytes_;
   Choice choice_;
 };
 
@@ -477,8 +521,13 @@ class Hdf5Walk final : public RowWalk {
 class Hdf5File final : public RowFile {
  public:
   Hdf5File(std::filesystem::path path, const LogOptions& options) : path_(std::move(path)) {
+    if (!options.trust) {
+      bag::refuse_holes(path_);
+    }
     const Handle file = open_file(path_);
-    choice_ = DatasetChooser(path_.string(), options, list_sources(file.get(), path_, options.trust)).choose();
+    choice_ =
+        DatasetChooser(path_.string(), options, list_sources(file.get(), path_, options.trust), size_of(file.get()))
+            .choose();
     for (const auto& [name, source] : choice_.found) {
       if (name != "t") {
         names_.push_back(name);

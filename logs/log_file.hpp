@@ -19,11 +19,6 @@ namespace wheelwright::logs {
 struct LogOptions : CsvOptions {
   /// Directories with definitions of messages (PKG/msg/TYPE.msg below them), for bags that do not bring their own.
   std::vector<std::filesystem::path> msg_path;
-  /// Whether a file may reach for others. Otherwise a log reads itself, the files of its directory that its metadata
-  /// name, and the journal beside it: no path out of the directory, no link that leads out of it, no HDF5 dataset whose
-  /// values stand in another file, no copy of a journal of more than 4 GiB, and at
-  /// most 16 GiB out of a recording that is packed.
-  bool trust = false;
 };
 
 /// Opens a log in one or several files or bag directories, told apart by their content; each begins a new segment.

@@ -128,6 +128,11 @@ struct McapReaderOptions {
   /// about twice this, and in practice twice the longest chunk.
   std::size_t max_record_bytes = std::size_t{1} << 29;
   bool hashed = false;  ///< whether McapReport::hash is wanted
+  /// Whether a chunk may unpack to more than 32 MiB and 100 times its size (otherwise it is left out and reported), and
+  /// all chunks to more than files::most_unpacked() of the file (otherwise next() throws InputError).
+  bool trust = false;
+  std::uint64_t stored = 0;  ///< bytes of the file that this one was unpacked from; 0 where it was not
+  std::string shown = {};    ///< name of the file in InputErrors about its chunks; its path where empty
 };
 
 /// A reader of one file.

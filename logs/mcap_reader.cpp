@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/core/error.hpp>
+#include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
 
@@ -57,6 +58,9 @@ namespace {
 /// Names, media type and lengths of an attachment are looked for in so many bytes.
 constexpr std::size_t attachment_head_bytes = std::size_t{1} << 16;
 
+constexpr std::uint64_t always_unpacked_chunk = std::uint64_t{1} << 25;
+constexpr std::uint64_t largest_chunk_ratio = 100;
+
 }  // namespace
 
 struct McapReader::Impl {
@@ -88,6 +92,7 @@ struct McapReader::Impl {
     file_.sum_until(summary_.data_crc != 0 ? section_.end - mcap::data_end_bytes : 0);
     at_ = mcap::magic.size();
     chunk_ = {};
+    unpacked_ = 0;
     index_of_.reset();
     chunk_met_ = summary_.chunked;
     if (!summary_.defect.empty()) {
@@ -294,6 +299,9 @@ struct McapReader::Impl {
       lost("compression " + word + " is not known: expected none, zstd or lz4");
     } else if (std::max(head.unpacked_size, head.packed_size) > options_.max_record_bytes) {
       lost(beyond_limit("it"));
+    } else if (const std::uint64_t most = most_of_chunk(head); head.unpacked_size > most) {
+      lost(fmt::format("by its head {} bytes come out of its {}: expected at most {}, or --trust", head.unpacked_size,
+                       head.packed_size, most));
     } else {
       const auto result = unpacker_.unpack(
           *compression, file_.view(records_at, static_cast<std::size_t>(head.packed_size)), head.unpacked_size);
@@ -302,6 +310,7 @@ struct McapReader::Impl {
       } else if (head.crc != 0 && mcap::crc32(result.bytes) != head.crc) {
         lost("its checksum does not match");
       } else {
+        count_unpacked(result.bytes.size());
         enter_chunk(result.bytes, offset, head.crc != 0);
       }
     }
@@ -313,7 +322,8 @@ struct McapReader::Impl {
     const std::uint64_t offset = at_;
     const std::uint64_t packed = section_.end - records_at;
     at_ = section_.end;
-    if (!compression || packed > options_.max_record_bytes || head.unpacked_size > options_.max_record_bytes) {
+    if (!compression || packed > options_.max_record_bytes || head.unpacked_size > options_.max_record_bytes ||
+        head.unpacked_size > most_of_chunk(head)) {
       damage(offset, section_.end - offset, "the file ends inside a chunk, which cannot be read");
       return;
     }
@@ -323,6 +333,20 @@ struct McapReader::Impl {
     const std::size_t kept = report_.damages.size();
     enter_chunk(result.bytes, offset, false);
     cut_damage_ = report_.damage_count == kept ? kept - 1 : McapReport::kept;
+  }
+
+  [[nodiscard]] std::uint64_t most_of_chunk(const mcap::ChunkHead& head) const {
+    return options_.trust ? options_.max_record_bytes
+                          : std::max(always_unpacked_chunk, largest_chunk_ratio * head.packed_size);
+  }
+
+  void count_unpacked(std::uint64_t bytes) {
+    unpacked_ += bytes;
+    const std::uint64_t stored = options_.stored > 0 ? options_.stored : file_.size();
+    if (!options_.trust && unpacked_ > files::most_unpacked(stored)) {
+      throw InputError(fmt::format("{}: its chunks: {}", options_.shown.empty() ? file_.name() : options_.shown,
+                                   files::too_much_unpacked(stored)));
+    }
   }
 
   void enter_chunk(std::string_view records, std::uint64_t offset, bool checked) {
@@ -539,6 +563,7 @@ struct McapReader::Impl {
   std::string_view chunk_;  ///< records still to be read
   std::uint64_t chunk_offset_ = 0;
   std::uint64_t chunk_messages_ = 0;
+  std::uint64_t unpacked_ = 0;  ///< bytes of all chunks so far
   bool chunk_checked_ = false;
   std::optional<std::size_t> cut_damage_;  ///< the damage that says that the chunk is cut off
 };

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <system_error>
+#include <unordered_set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -46,6 +47,10 @@ RosDefinition parse_ros_definition(std::string type_name, std::string_view text)
   type_name = full_ros_name(type_name);
   if (type_name.find('/') == std::string::npos) {
     throw InputError(type_name + ": expected the name of a type as \"pkg/msg/Type\"");
+  }
+  if (text.size() > longest_definition) {
+    throw InputError(fmt::format("{}: a definition of {} bytes: expected at most {}", files::shown(type_name),
+                                 text.size(), longest_definition));
   }
   RosDefinition definition =
       ros::assemble(type_name, ros::read_messages(type_name, text, type_name), ros::bundled_message);
@@ -95,8 +100,10 @@ std::optional<RosDefinition> RosDefinitions::find(const std::string& type_name) 
       return ros::bundled_message(name);
     }
     const std::string source = file->second.string();
-    const std::string text =
-        std::filesystem::is_empty(file->second) ? "" : files::read_bytes(file->second, longest_definition);
+    std::error_code error;
+    const bool empty = std::filesystem::is_regular_file(file->second, error) && !error &&
+                       std::filesystem::is_empty(file->second, error);
+    const std::string text = empty ? "" : files::read_bytes(file->second, longest_definition);
     auto messages = ros::read_messages(name, text, source);
     return &read.emplace(name, std::move(messages[name])).first->second;
   };
@@ -158,6 +165,8 @@ constexpr std::array<std::pair<std::string_view, RosKind>, 15> primitives = {{{"
                                                                               {"string", RosKind::string},
                                                                               {"wstring", RosKind::wstring}}};
 
+constexpr std::size_t longest_name = 255;
+
 bool blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
 std::string_view trimmed(std::string_view text) {
@@ -195,7 +204,8 @@ struct LineReader {
   const std::string& source;
   std::string package;
   std::size_t line = 0;
-  std::string_view text;
+  std::string_view text{};
+  std::unordered_set<std::string> names{};  ///< of the fields of the type so far
 
   [[noreturn]] void fail(std::string_view expected) const {
     throw InputError(fmt::format("{}: line {}: {}: expected {}", source, line, files::shown(text), expected));
@@ -265,8 +275,8 @@ struct LineReader {
     const auto end = static_cast<std::size_t>(
         std::find_if(rest.begin(), rest.end(), [](char c) { return blank(c) || c == '='; }) - rest.begin());
     const std::string_view name = rest.substr(0, end);
-    if (!is_name(name)) {
-      fail("a type and a name of letters, digits and '_'");
+    if (!is_name(name) || name.size() > longest_name) {
+      fail(fmt::format("a type and a name of letters, digits and '_', at most {} of them", longest_name));
     }
     rest = trimmed(rest.substr(end));
     if (rest.starts_with("=")) {
@@ -276,8 +286,7 @@ struct LineReader {
       return;
     }
     item.field.name = std::string(name);
-    if (std::any_of(message.fields.begin(), message.fields.end(),
-                    [&](const TextField& other) { return other.field.name == name; })) {
+    if (!names.insert(item.field.name).second) {
       fail("a name that is not there twice");
     }
     message.fields.push_back(std::move(item));
@@ -298,7 +307,7 @@ TextMessages read_messages(const std::string& type_name, std::string_view text, 
   bool idl = false;
   bool named = false;  // by a line "MSG: …"
   bool expect_head = false;
-  LineReader reader{source, package_of(type_name), 0, {}};
+  LineReader reader{source, package_of(type_name)};
   TextMessage message{source, {}};
   const auto close = [&] {
     // The first part may be empty, and the type defined behind a separator of its own.
@@ -306,6 +315,7 @@ TextMessages read_messages(const std::string& type_name, std::string_view text, 
       messages.try_emplace(name, std::move(message));
     }
     message = {source, {}};
+    reader.names.clear();
   };
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());

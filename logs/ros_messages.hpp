@@ -78,7 +78,7 @@ struct RosDefinition {
 /// and a line "MSG: pkg/Type" (MCAP's encoding "ros2msg"; REP 2016 does not change it). Constants and default values
 /// are skipped. A type that is used and not there is taken from the bundled ones. Throws InputError
 /// "`type_name`: line 7: 'text': expected …" for what is no definition, for types that are not known and for types that
-/// contain themselves.
+/// contain themselves; for a text of more than 1 MiB and a name of more than 255 characters.
 [[nodiscard]] RosDefinition parse_ros_definition(std::string type_name, std::string_view text);
 
 /// The definition as parse_ros_definition reads it: without comments, constants and default values.
@@ -273,9 +273,9 @@ class RosExtractor {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Every number that a message may have, in the order of the definition, at most 10 000; lists with "[]", as
+/// Numbers that a message may have, in the order of the definition, the first `most`; lists with "[]", as
 /// "poses[].pose.position.x".
-[[nodiscard]] std::vector<std::string> numeric_paths(const RosDefinition& definition);
+[[nodiscard]] std::vector<std::string> numeric_paths(const RosDefinition& definition, std::size_t most = 10'000);
 
 /// The list of strings `name`, `names`, `joint_names` or `interface_names` of a message; nothing where the type has
 /// none or the message cannot be read.

@@ -16,8 +16,6 @@
 namespace wheelwright::logs {
 namespace {
 
-constexpr std::size_t most_paths = 10'000;
-
 std::vector<std::string> field_names(const RosMessage& message) {
   std::vector<std::string> names;
   for (const RosField& field : message.fields) {
@@ -125,20 +123,59 @@ struct PathReader {
   }
 };
 
-void add_paths(const RosDefinition& definition, std::size_t message, const std::string& before,
-               std::vector<std::string>& paths) {
-  for (const RosField& field : definition.messages[message].fields) {
-    if (paths.size() >= most_paths) {
-      return;
+/// Lists the paths of a definition. Types without a number are not entered: a definition whose types double thirty
+/// times has few lines and 10^9 texts.
+class PathLister {
+ public:
+  PathLister(const RosDefinition& definition, std::size_t most)
+      : definition_(definition), most_(most), numbers_(definition.messages.size(), Numbers::unknown) {}
+
+  std::vector<std::string> list() {
+    if (has_numbers(0)) {
+      add(0, "");
     }
-    const std::string path = before + field.name + (field.shape == RosShape::single ? "" : "[]");
-    if (field.kind == RosKind::message) {
-      add_paths(definition, field.message, path + ".", paths);
-    } else if (field.kind != RosKind::string && field.kind != RosKind::wstring) {
-      paths.push_back(path);
+    return std::move(paths_);
+  }
+
+ private:
+  enum class Numbers : std::uint8_t { unknown, none, some };
+
+  bool has_numbers(std::size_t message) {
+    if (numbers_[message] == Numbers::unknown) {
+      const bool some = std::ranges::any_of(definition_.messages[message].fields,
+                                            [this](const RosField& field) { return leads_to_numbers(field); });
+      numbers_[message] = some ? Numbers::some : Numbers::none;
+    }
+    return numbers_[message] == Numbers::some;
+  }
+
+  bool leads_to_numbers(const RosField& field) {
+    return field.kind == RosKind::message ? has_numbers(field.message)
+                                          : field.kind != RosKind::string && field.kind != RosKind::wstring;
+  }
+
+  void add(std::size_t message, const std::string& before) {
+    for (const RosField& field : definition_.messages[message].fields) {
+      if (paths_.size() >= most_) {
+        return;
+      }
+      if (!leads_to_numbers(field)) {
+        continue;
+      }
+      const std::string path = before + field.name + (field.shape == RosShape::single ? "" : "[]");
+      if (field.kind == RosKind::message) {
+        add(field.message, path + ".");
+      } else {
+        paths_.push_back(path);
+      }
     }
   }
-}
+
+  const RosDefinition& definition_;
+  std::size_t most_;
+  std::vector<Numbers> numbers_;  ///< of each message
+  std::vector<std::string> paths_;
+};
 
 }  // namespace
 
@@ -167,10 +204,8 @@ std::optional<std::size_t> ros::names_of(const RosMessage& message, std::size_t 
   return std::nullopt;
 }
 
-std::vector<std::string> numeric_paths(const RosDefinition& definition) {
-  std::vector<std::string> paths;
-  add_paths(definition, 0, "", paths);
-  return paths;
+std::vector<std::string> numeric_paths(const RosDefinition& definition, std::size_t most) {
+  return PathLister(definition, most).list();
 }
 
 }  // namespace wheelwright::logs

@@ -156,7 +156,8 @@ TEST(Kernels, ScansFindTheSameRowsInEveryVariantAndThoseOfThePlainFormula) {
         count = table->examine(given.slabs, at, found.data(), open.data(), &most);
         const std::vector<std::uint32_t> violated(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count));
         count = table->examine(given.slabs, at, found.data(), nullptr, nullptr);
-        EXPECT_EQ(violated, std::vector<std::uint32_t>(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count)));
+        EXPECT_EQ(violated,
+                  std::vector<std::uint32_t>(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count)));
         if (table == available().front()) {
           first[0] = plain;
           first[1] = slanted;

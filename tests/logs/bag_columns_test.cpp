@@ -27,13 +27,15 @@ class Bag {
     topic.name = name;
     topic.type = type;
     topic.encoding = "cdr";
-    topic.definition = bundled_ros_definition(type);
+    if (auto definition = bundled_ros_definition(type)) {
+      topic.definition = std::make_shared<const RosDefinition>(*std::move(definition));
+    }
     topics_.push_back(std::move(topic));
     views_.push_back({nullptr, false, std::move(names), std::move(filled)});
   }
   void define(const std::string& name, const std::string& type, const std::string& text) {
     add(name, type);
-    topics_.back().definition = parse_ros_definition(type, text);
+    topics_.back().definition = std::make_shared<const RosDefinition>(parse_ros_definition(type, text));
   }
 
   BagChoice choose(const CsvOptions& options = {}) {

@@ -13,6 +13,7 @@
 #include "logs/bag_samples.hpp"
 #include "support/scratch.hpp"
 
+#include <wheelwright/logs/database.hpp>
 #include <wheelwright/logs/log_file.hpp>
 
 namespace wheelwright::logs::reach_test {
@@ -97,6 +98,50 @@ TEST_F(Reach, AJournalThatNamesAnotherFileDoesNotDeleteIt) {
   sqlite3_exec(database, "SELECT count(*) FROM messages", nullptr, nullptr, nullptr);
   sqlite3_close(database);
   EXPECT_FALSE(fs::exists(victim));
+}
+
+// A store of results is opened for writing where it stands, not as a copy: `fleet --out` with such a journal beside its
+// results.sqlite deleted any file.
+TEST_F(Reach, AJournalBesideADatabaseOfOursDeletesNothing) {
+  const fs::path store = unfinished(), victim = put("victim.txt", "dear to somebody");
+  const std::string journal = bytes(path("bag.db3-journal")), before = bytes(store);
+  for (const auto mode : {bag::Database::Mode::keeping, bag::Database::Mode::writing}) {
+    put("bag.db3-journal", journal + super_journal(victim.string()));
+    expect_refusal([&] { (void)bag::Database(store, "store", mode); },
+                   {"bag.db3-journal", "names another file", "remove it"});
+    EXPECT_TRUE(fs::exists(victim));
+    EXPECT_TRUE(fs::exists(path("bag.db3-journal")));
+    EXPECT_EQ(bytes(store), before);
+
+    // Also where the database is a link: SQLite looks for journals where it leads.
+    fs::create_directories(path("elsewhere"));
+    fs::remove(path("elsewhere/link.db3"));
+    fs::create_symlink(store, path("elsewhere/link.db3"));
+    expect_refusal([&] { (void)bag::Database(path("elsewhere/link.db3"), "store", mode); }, {"bag.db3-journal"});
+  }
+  // The journal of a killed run names none, and is played back.
+  put("bag.db3-journal", journal);
+  bag::Database database(store, "store", bag::Database::Mode::keeping);
+  bag::Statement count = database.prepare("SELECT count(*) FROM messages");
+  ASSERT_EQ(count.step(), bag::Statement::Result::row);
+  EXPECT_EQ(count.integer(0), 40);
+}
+
+// SQLite empties a journal and writes a log ahead where a link leads.
+TEST_F(Reach, AJournalOfADatabaseOfOursIsNoLink) {
+  for (const std::string ending : {"-journal", "-wal"}) {
+    testing::write_humble(path("store.db3"), sample_items(3));
+    const fs::path victim = put("victim.txt", "dear to somebody"), beside = path("store.db3" + ending);
+    for (const bool hard : {false, true}) {
+      fs::remove(beside);
+      hard ? fs::create_hard_link(victim, beside) : fs::create_symlink(victim, beside);
+      expect_refusal([&] { (void)bag::Database(path("store.db3"), "store", bag::Database::Mode::keeping); },
+                     {"store.db3" + ending, "link"});
+      EXPECT_EQ(bytes(victim), "dear to somebody");
+    }
+    fs::remove(beside);
+    fs::remove(path("store.db3"));
+  }
 }
 
 TEST_F(Reach, AJournalIsNoLinkAndNotWithoutEnd) {

@@ -51,6 +51,19 @@ class ResultStoreTest : public testing::ScratchTest {
   std::filesystem::path file() const { return path("results.sqlite"); }
 };
 
+// The store is opened where it stands. A journal beside it, as a killed run leaves one, may name a file that SQLite
+// deletes when it has played the journal back.
+TEST_F(ResultStoreTest, AJournalThatNamesAnotherFileIsRefused) {
+  { SqliteResults(file(), kPlan, items(4)).put(3, "three"); }
+  const auto victim = put("victim.txt", "dear to somebody");
+  put("results.sqlite-journal", victim.string() + std::string("\xd9\xd5\x05\xf9\x20\xa1\x63\xd7", 8));
+  EXPECT_THAT(input_error([&] { SqliteResults(file(), kPlan, items(4)); }),
+              AllOf(HasSubstr("results.sqlite-journal: names another file"), HasSubstr("remove it")));
+  EXPECT_TRUE(std::filesystem::exists(victim));
+  std::filesystem::remove(path("results.sqlite-journal"));
+  EXPECT_TRUE(SqliteResults(file(), kPlan, items(4)).has(3));
+}
+
 TEST_F(ResultStoreTest, GivesBackEveryByteInTheOrderOfItems) {
   const std::string bytes("a\0b\n\xff", 5);
   {
