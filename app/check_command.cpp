@@ -59,7 +59,7 @@ int run(const Arguments& a) {
             check_report(check, claims, files, results::software()));
   }
   if (!a.common.quiet && !a.common.json) {
-    say("{}", results::check_summary(check, claims));
+    say_lines(results::check_summary(check, claims));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "check.json").string(), (a.common.out / "report.html").string());
     }

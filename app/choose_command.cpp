@@ -89,15 +89,17 @@ int run(const Arguments& a) {
       files.json = false;
       report::ReportContext context = report_context(a.common, log.report(), log);
       context.seen = commission::first_look(log, choice.chosen->model, options.trial.threads);
+      files::write_json(gathered(a.common) / "choice.json", json);
       publish(files, results::to_json(*choice.chosen, log.report(), results::software()), "model.json",
               report::choice_report(choice, context));
+    } else {
+      files::write_json(a.common.out / "choice.json", json);
     }
-    files::write_json(a.common.out / "choice.json", json);
   }
   if (a.common.json) {
     say_json(json);
   } else if (!a.common.quiet) {
-    say("{}", words::summary(choice, choice.chosen ? results::robot_file_line(choice.candidates.front().filter) : ""));
+    say_lines(words::summary(choice, choice.chosen ? results::robot_file_line(choice.candidates.front().filter) : ""));
   }
   return choice.chosen ? kDone : kNo;
 }

@@ -87,7 +87,7 @@ int run(const Arguments& a) {
   publish(a.common, model, "model.json", report::commission_report(result, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
-    say("{}", summary(result));
+    say_lines(summary(result));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "model.json").string(), (a.common.out / "report.html").string());
     }

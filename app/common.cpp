@@ -12,6 +12,7 @@
 #include <iostream>
 #include <mutex>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -25,23 +26,58 @@
 
 namespace wheelwright::app {
 
-void write_text(std::FILE* stream, std::string_view text) {
-  const std::string fit = files::printable(text);
-  std::fwrite(fit.data(), 1, fit.size(), stream);
+namespace {
+
+int output_error = 0;  // errno of the first failure of standard output
+
+void put(std::FILE* stream, std::string_view text) {
+  errno = 0;
+  if (std::fwrite(text.data(), 1, text.size(), stream) != text.size() && stream == stdout && output_error == 0) {
+    output_error = errno;
+  }
 }
 
-void say_json(const Json& result) {
-  const std::string text = files::json_text(result) + "\n";
-  std::fwrite(text.data(), 1, text.size(), stdout);
+}  // namespace
+
+void write_text(std::FILE* stream, std::string_view text) { put(stream, files::printable(text)); }
+
+void say_lines(std::string_view text) { write_text(stdout, text); }
+
+void tell_error(std::string_view message) {
+  std::string text = "wheelwright: ";
+  for (std::size_t end = 0; !message.empty(); message.remove_prefix(end)) {
+    end = message.find("\n ", 1);
+    end = end == std::string_view::npos ? message.size() : end;
+    const bool own = message.starts_with("\n ");
+    text += (own ? "\n" : "") + files::one_line(message.substr(own ? 1 : 0, end - (own ? 1 : 0)));
+  }
+  write_text(stderr, text + "\n");
+}
+
+void say_json(const Json& result) { put(stdout, files::json_text(result) + "\n"); }
+
+void say_line(std::string_view line) {
+  put(stdout, line);
+  put(stdout, "\n");
+  errno = 0;
+  if (std::fflush(stdout) != 0 && output_error == 0) {
+    output_error = errno;
+  }
+  if (std::ferror(stdout) != 0) {
+    throw OutputLost();
+  }
 }
 
 int finished(int code) {
   std::cout.flush();
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) {
+  errno = 0;
+  const bool flushed = std::fflush(stdout) == 0;
+  const int error = output_error != 0 ? output_error : errno;
+  if (flushed && std::ferror(stdout) == 0 && std::cout.good()) {
     return code;
   }
   tell("wheelwright: standard output: cannot be written ({}): what stands there is not whole; expected room there\n",
-       std::strerror(errno));
+       std::strerror(error));
   return kBadInput;
 }
 
@@ -187,11 +223,12 @@ void make_directory(const CommonOptions& options, const std::vector<std::string>
   }
   const std::lock_guard<std::mutex> lock(made_mutex());
   std::error_code error;
-  std::vector<std::filesystem::path>& made = made_directories();
+  std::vector<std::filesystem::path> made;
   for (std::filesystem::path at = options.out; !at.empty() && !std::filesystem::exists(at, error);
        at = at.parent_path()) {
     made.push_back(at);
   }
+  made_directories().insert(made_directories().begin(), made.begin(), made.end());
   error.clear();
   std::filesystem::create_directories(options.out, error);
   if (error || !std::filesystem::is_directory(options.out)) {
@@ -200,19 +237,92 @@ void make_directory(const CommonOptions& options, const std::vector<std::string>
   }
 }
 
+namespace {
+
+// What a run writes into `out`, all of it before any of it is put there.
+struct Gathering {
+  explicit Gathering(const std::filesystem::path& place)
+      : out(place),
+        directory(place / ".wheelwright-part", files::Temporary::Kind::directory, place.string(),
+                  "a writable place with room on the disk") {}
+
+  std::filesystem::path out;
+  files::Temporary directory;
+  std::vector<std::string> dropped;
+};
+
+std::unique_ptr<Gathering>& gathering() {
+  static std::unique_ptr<Gathering> now;
+  return now;
+}
+
+Gathering& gathering_for(const CommonOptions& options) {
+  std::unique_ptr<Gathering>& now = gathering();
+  if (!now || now->out != options.out) {
+    now = std::make_unique<Gathering>(options.out);
+  }
+  return *now;
+}
+
+std::string named_page(const CommonOptions& options, std::string page) {
+  if (const std::size_t head = page.find(kHead); head != std::string::npos) {
+    page.insert(head + kHead.size(), fmt::format("{}{}\">\n", kGenerator, options.command));
+  }
+  return files::valid_utf8(page);
+}
+
+// Links stay what they are, and pipes and devices are written to.
+void put_in_place(const std::filesystem::path& from, const std::filesystem::path& to) {
+  const std::filesystem::file_status there = std::filesystem::symlink_status(to);
+  if (!std::filesystem::exists(there) || std::filesystem::is_regular_file(there)) {
+    std::error_code error;
+    std::filesystem::rename(from, to, error);
+    if (error) {
+      throw InputError(to.string() + ": cannot be written (" + error.message() + "): expected a writable place");
+    }
+    return;
+  }
+  std::ifstream in(from, std::ios::binary);
+  files::AtomicFile out(to);
+  std::string piece(std::size_t{1} << 16, '\0');
+  while (in.read(piece.data(), static_cast<std::streamsize>(piece.size())), in.gcount() > 0) {
+    out.write(std::string_view(piece).substr(0, static_cast<std::size_t>(in.gcount())));
+  }
+  out.commit();
+}
+
+}  // namespace
+
 void write_page(const CommonOptions& options, std::string page) {
   if (!options.out.empty()) {
-    if (const std::size_t head = page.find(kHead); head != std::string::npos) {
-      page.insert(head + kHead.size(), fmt::format("{}{}\">\n", kGenerator, options.command));
-    }
-    files::atomic_write(options.out / kPage, page);
+    files::atomic_write(options.out / kPage, named_page(options, std::move(page)));
   }
 }
 
+std::filesystem::path gathered(const CommonOptions& options) { return gathering_for(options).directory.path(); }
+
+void drop(const CommonOptions& options, const std::string& name) { gathering_for(options).dropped.push_back(name); }
+
+void discard_gathered() { gathering().reset(); }
+
 void publish(const CommonOptions& options, const Json& result, const std::string& name, const std::string& report) {
   if (!options.out.empty()) {
-    write_page(options, report);
-    files::write_json(options.out / name, result);
+    const Gathering& all = gathering_for(options);
+    const std::filesystem::path& from = all.directory.path();
+    files::atomic_write(from / kPage, named_page(options, report));
+    files::write_json(from / name, result);
+    for (const std::string& dropped : all.dropped) {
+      std::filesystem::remove(options.out / dropped);
+    }
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(from)) {
+      names.push_back(entry.path().filename().string());
+    }
+    std::ranges::sort(names, {}, [&](const std::string& each) { return std::pair(each == name, each); });
+    for (const std::string& each : names) {
+      put_in_place(from / each, options.out / each);
+    }
+    discard_gathered();
   }
   if (options.json) {
     say_json(result);

@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -21,6 +22,7 @@
 #include <wheelwright/detector/detector.hpp>
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/json.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/report/commission_report.hpp>
 #include <wheelwright/report/page.hpp>
@@ -58,18 +60,45 @@ struct CommonOptions {
 
 /// Writes a text on a stream, fit for a terminal (files::printable). What goes wrong is found by finished().
 void write_text(std::FILE* stream, std::string_view text);
-/// Prints on standard output with write_text().
+/// A value of write_values(): a text stays on its line (files::one_line).
+template <typename Value>
+auto in_line(const Value& value) {
+  if constexpr (std::is_convertible_v<const Value&, std::string_view>) {
+    return files::one_line(value);
+  } else {
+    return value;
+  }
+}
+/// write_text() of `text` with `values` in it, each in_line(): what a file or an argument says makes no line of its own.
+template <typename... Values>
+void write_values(std::FILE* stream, fmt::string_view text, const Values&... values) {
+  const auto write = [&](const auto&... fit) { write_text(stream, fmt::vformat(text, fmt::make_format_args(fit...))); };
+  write(in_line(values)...);
+}
+/// Prints on standard output with write_values().
 template <typename... Values>
 void say(fmt::format_string<Values...> text, Values&&... values) {
-  write_text(stdout, fmt::format(text, std::forward<Values>(values)...));
+  write_values(stdout, text, values...);
 }
+/// Prints a text of several lines on standard output with write_text().
+void say_lines(std::string_view text);
 /// Prints a result and a line end on standard output.
 void say_json(const Json& result);
-/// Prints on standard error with write_text().
+/// Prints on standard error with write_values().
 template <typename... Values>
 void tell(fmt::format_string<Values...> text, Values&&... values) {
-  write_text(stderr, fmt::format(text, std::forward<Values>(values)...));
+  write_values(stderr, text, values...);
 }
+/// Prints an error on standard error. Lines of its own begin with a blank: other line ends come from files and arguments,
+/// and are shown.
+void tell_error(std::string_view message);
+/// Standard output takes no more: finished() says so, and why.
+class OutputLost : public Error {
+ public:
+  OutputLost() : Error("standard output cannot be written") {}
+};
+/// Writes a line on standard output as it is, at once. Throws OutputLost where it cannot be written.
+void say_line(std::string_view line);
 /// Ends a run that would have exited with `code`: that, or kBadInput, and a word why, where standard output could not
 /// take all of the result.
 [[nodiscard]] int finished(int code);
@@ -102,8 +131,16 @@ void remove_empty_directories();
 /// Writes out/report.html where a directory is wanted, with the name of the command in its head.
 void write_page(const CommonOptions& options, std::string page);
 
-/// Writes `result` to out/name and report to out/report.html where a directory is wanted, and the result to standard
-/// output with --json.
+/// Directory inside of `out` (not empty) for the files of a result that stand beside its JSON: publish() moves them out
+/// of it, a run that fails leaves none of them, and replaces none of an earlier one's.
+[[nodiscard]] std::filesystem::path gathered(const CommonOptions& options);
+/// publish() removes out/name, which an earlier run may have left and this one's result has not.
+void drop(const CommonOptions& options, const std::string& name);
+/// Removes what is gathered and was not published.
+void discard_gathered();
+
+/// Writes `result` to out/name and report to out/report.html where a directory is wanted, with what was gathered(), all
+/// of it or nothing, and the result to standard output with --json.
 void publish(const CommonOptions& options, const Json& result, const std::string& name, const std::string& report);
 
 /// Prints what reading a log found (sentences(LogReport)), a line each, on standard output.

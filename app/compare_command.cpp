@@ -89,7 +89,7 @@ int run(const Arguments& a) {
     for (const std::string& remark : remarks(before, after)) {
       say("{}\n", remark);
     }
-    say("{}", words::summary(comparison));
+    say_lines(words::summary(comparison));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "comparison.json").string(), (a.common.out / "report.html").string());
     }

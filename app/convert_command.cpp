@@ -39,6 +39,7 @@ int run(const Arguments& a) {
   std::vector<std::filesystem::path> from = a.paths;
   const std::filesystem::path to = from.back();
   from.pop_back();
+  keep_inputs(to, from);
   keep_existing(a.common, to);
   const std::unique_ptr<logs::RecordedLog> log = logs::open_log(from, reader_options(a.common));
   const logs::LogReport& report = log->report();

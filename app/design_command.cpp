@@ -155,16 +155,17 @@ std::vector<design::InspectedFault> inspected(const Arguments& a, const OnlineMo
 void write_plans(const Arguments& a, const design::DesignSubject& subject, const design::Plan& plan,
                  const std::optional<design::Plan>& eight) {
   if (!a.common.out.empty()) {
-    write_drive(a.common.out, kManoeuvre, design::command_table(plan, subject.model), subject.robot);
+    const std::filesystem::path out = gathered(a.common);
+    write_drive(out, kManoeuvre, design::command_table(plan, subject.model), subject.robot);
     if (eight) {
-      logs::write_csv(a.common.out / kFigureEight, design::command_table(*eight, subject.model));
+      logs::write_csv(out / kFigureEight, design::command_table(*eight, subject.model));
     }
   }
 }
 
 void tell(const Arguments& a, const std::string& summary) {
   if (!a.common.quiet && !a.common.json) {
-    say("{}", summary);
+    say_lines(summary);
     if (!a.common.out.empty()) {
       say("wrote {} (speeds of the wheels to drive), design.json and report.html beside it\n",
           (a.common.out / drive_files(kManoeuvre).front()).string());

@@ -2,7 +2,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <iostream>
 #include <memory>
 
 #include <fmt/format.h>
@@ -56,6 +55,15 @@ constexpr const char* kExamples =
     "than\n"
     "half of the rows, or, with --follow, at none of the last ones. --follow tells such spells as they come (blind),\n"
     "and when no row has come for 5 s (silent). With --out they are appended to DIR/events.jsonl, too.";
+
+// The share of the rows that were met at which nothing was decided; 0 where it is hardly more than the filter settles in.
+double undecided_share(const Detection& detection, const OnlineModel& model, const logs::RecordedLog& log) {
+  constexpr double kWorthAWord = 0.05;
+  const auto rows = static_cast<double>(log.report().rows_read);
+  const double settling = model.filter.settle / (model.filter.beta * log.median_step());
+  const double undecided = rows - static_cast<double>(detection.instants);
+  return undecided - settling > kWorthAWord * rows ? undecided / rows : 0.0;
+}
 
 // Why the log as a whole is not decided; empty where it is: all but what the filter settles in, or half of it.
 std::string why_not_decided(const Detection& detection, const OnlineModel& model, const logs::RecordedLog& log) {
@@ -127,7 +135,7 @@ int run(const Arguments& a) {
         std::filesystem::remove(how.events);
       }
     }
-    return follow(STDIN_FILENO, std::cout, std::move(detector), model, a.detector, reader, how);
+    return follow(STDIN_FILENO, std::move(detector), model, a.detector, reader, how);
   }
   if (a.heartbeat > 0.0) {
     throw InputError("--heartbeat: expected --follow, which it is of");
@@ -165,6 +173,7 @@ int run(const Arguments& a) {
   const bool fault = !detection.events.empty() || !at_risk.events.empty() ||
                      (kinematic.detection && !kinematic.detection->events.empty());
   const std::string undecided = why_not_decided(detection, model, log);
+  const double share = undecided_share(detection, model, log);
   if (!a.common.out.empty() || a.common.json) {
     Json json = results::to_json(detection, model, a.model.string(), a.log.string(), results::software());
     results::add_isolation(json, isolations);
@@ -173,6 +182,9 @@ int run(const Arguments& a) {
     results::add_incidents(json, incidents);
     if (!undecided.empty()) {
       json["undecided"] = undecided;
+    }
+    if (share > 0.0) {
+      json["undecided_share"] = share;
     }
     std::string page;
     if (!a.common.out.empty()) {
@@ -188,7 +200,10 @@ int run(const Arguments& a) {
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
-    say("{}{}{}{}", summary(incidents), summary(detection, model), summary(at_risk, model), summary(kinematic, model));
+    say_lines(summary(incidents) + summary(detection, model) + summary(at_risk, model) + summary(kinematic, model));
+    if (share > 0.0 && undecided.empty()) {
+      say("not watched: {:.0f} % of the {} rows could not be decided on\n", 100.0 * share, log.report().rows_read);
+    }
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "detection.json").string(), (a.common.out / "report.html").string());
     }

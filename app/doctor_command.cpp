@@ -59,7 +59,7 @@ int run(const Arguments& a) {
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
-    say("{}", words::summary(health, a.all));
+    say_lines(words::summary(health, a.all));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "doctor.json").string(), (a.common.out / "report.html").string());
     }

@@ -93,7 +93,7 @@ int run(const Arguments& a) {
   if (a.common.json) {
     say_json(to_json(a, model, detector, file, text));
   } else if (file.empty()) {
-    say("{}", text);
+    say_lines(text);
   } else if (!a.common.quiet) {
     say("wrote {} ({:.0f} kB)\n", file, static_cast<double>(text.size()) / 1000.0);
   }

@@ -79,7 +79,7 @@ study::FleetResult gather(results::SqliteResults& results, const Arguments& a) {
   study::FleetResult fleet;
   std::optional<files::AtomicFile> csv;
   if (!a.common.out.empty()) {
-    csv.emplace(a.common.out / "fleet.csv");
+    csv.emplace(gathered(a.common) / "fleet.csv");
     csv->write(results::fleet_csv_header());
   }
   results.each([&](std::size_t item, std::string_view text) {
@@ -148,12 +148,13 @@ int run(const Arguments& a) {
   context.log_files = {a.list.string()};
   context.seeds = {{"which robots the pooled prior learns from", a.common.seed}};
   if (!a.common.out.empty()) {
-    files::atomic_write(a.common.out / "pooled_prior.yaml", results::pooled_prior_yaml(fleet, results::software()));
+    files::atomic_write(gathered(a.common) / "pooled_prior.yaml",
+                        results::pooled_prior_yaml(fleet, results::software()));
   }
   publish(a.common, results::to_json(fleet, a.list.string(), results::software()), "fleet.json",
           a.common.out.empty() ? std::string() : report::fleet_report(fleet, context));
   if (!a.common.quiet && !a.common.json) {
-    say("{}", words::summary(fleet));
+    say_lines(words::summary(fleet));
     if (!a.common.out.empty()) {
       say("wrote fleet.json, fleet.csv, pooled_prior.yaml and report.html to {}\n", a.common.out.string());
     }

@@ -4,13 +4,18 @@
 #include <poll.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -21,6 +26,7 @@
 #include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/files/bytes.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/csv.hpp>
 
 #include <wheelwright/results/detection_json.hpp>
@@ -53,12 +59,76 @@ std::optional<std::vector<std::size_t>> pick_columns(const logs::CsvRowParser& p
   return pick;
 }
 
-// Writes what happens as it happens.
+// A file of lines to which each run appends: whatever ends a run, it holds whole lines.
+class LineFile {
+ public:
+  /// Cuts off what a run that was killed, or a full disk, left of its last line.
+  explicit LineFile(std::filesystem::path path) : path_(std::move(path)) {
+    std::error_code error;
+    size_ = std::filesystem::file_size(path_, error);
+    if (error) {
+      size_ = 0;
+    } else if (const std::uintmax_t whole = whole_lines(); whole < size_) {
+      size_ = whole;
+      cut();
+    }
+    file_.open(path_, std::ios::app | std::ios::binary);
+  }
+
+  /// Appends `line` and its end. Throws InputError where the file cannot take all of it.
+  void append(const std::string& line) {
+    errno = 0;
+    if (!(file_ << line + "\n" << std::flush)) {
+      const int why = errno;
+      file_.close();
+      cut();
+      throw InputError(fmt::format("{}: cannot be written ({}): expected a writable place with room on the disk",
+                                   path_.string(), std::strerror(why)));
+    }
+    size_ += line.size() + 1;
+  }
+
+ private:
+  // Bytes up to the end of the last whole line.
+  [[nodiscard]] std::uintmax_t whole_lines() const {
+    std::ifstream in(path_, std::ios::binary);
+    std::string piece(std::size_t{1} << 16, '\0');
+    for (std::uintmax_t end = size_; end > 0;) {
+      const std::uintmax_t from = end - std::min<std::uintmax_t>(end, piece.size());
+      in.seekg(static_cast<std::streamoff>(from));
+      in.read(piece.data(), static_cast<std::streamsize>(end - from));
+      if (!in) {
+        return size_;
+      }
+      const std::size_t at = std::string_view(piece).substr(0, static_cast<std::size_t>(end - from)).rfind('\n');
+      if (at != std::string_view::npos) {
+        return from + at + 1;
+      }
+      end = from;
+    }
+    return 0;
+  }
+  void cut() const {
+    std::error_code ignored;  // a pipe or a device holds no lines
+    if (std::filesystem::is_regular_file(path_, ignored)) {
+      std::filesystem::resize_file(path_, size_, ignored);
+      if (size_ == 0) {
+        std::filesystem::remove(path_, ignored);
+      }
+    }
+  }
+
+  std::filesystem::path path_;
+  std::ofstream file_;
+  std::uintmax_t size_ = 0;
+};
+
+// Writes what happens as it happens: the file first, since what reads standard output may be gone.
 class Teller {
  public:
-  Teller(std::ostream& out, const FollowOptions& how) : out_(out), json_(how.json), path_(how.events) {
-    if (!path_.empty()) {
-      file_.open(path_, std::ios::app);
+  explicit Teller(const FollowOptions& how) : json_(how.json) {
+    if (!how.events.empty()) {
+      file_.emplace(how.events);
     }
   }
 
@@ -66,24 +136,22 @@ class Teller {
   template <typename AsJson, typename AsText>
   void operator()(const AsJson& as_json, const AsText& as_text) {
     std::string line;
-    if (json_ || !path_.empty()) {
+    if (json_ || file_) {
       line = files::json_text(as_json(), -1);
     }
-    out_ << (json_ ? line : std::string(as_text())) << std::endl;
     append(line);
+    say_line(json_ ? line : files::one_line(std::string(as_text())));
   }
   /// A line for the file alone.
   void append(const std::string& line) {
-    if (!path_.empty() && !(file_ << line << std::endl)) {
-      throw InputError(path_.string() + ": cannot be written: expected a writable place with room on the disk");
+    if (file_) {
+      file_->append(line);
     }
   }
 
  private:
-  std::ostream& out_;
   bool json_;
-  std::filesystem::path path_;
-  std::ofstream file_;
+  std::optional<LineFile> file_;
 };
 
 // One residual: its detector, its columns, its events, and the model that names its outputs.
@@ -252,9 +320,9 @@ class Blindness {
 
 }  // namespace
 
-ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const OnlineModel& model,
-                const detector::DetectorOptions& options, const logs::CsvOptions& reader, const FollowOptions& how) {
-  Teller teller(out, how);
+ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, const detector::DetectorOptions& options,
+                const logs::CsvOptions& reader, const FollowOptions& how) {
+  Teller teller(how);
   teller.append(files::json_text({{"schema", kEventsSchema},
                                   {"software", results::software()},
                                   {"robot", model.robot.name},
@@ -342,8 +410,10 @@ ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const On
                              blindness.blind() ? ", blind" : "", open ? ", an incident is open" : "");
         });
   };
+  std::size_t lines = 0;  // of data, readable or not
   while (in.next(line)) {
     blindness.begin_line();
+    lines += logs::is_csv_content(line) ? 1 : 0;
     try {
       if (!parser.parse(line, row)) {
         if (logs::is_csv_content(line)) {
@@ -414,6 +484,11 @@ ExitCode follow(int stream, std::ostream& out, TorqueDetector detector, const On
   }
   if (blindness.blind()) {
     tell("wheelwright detect: standard input ended {}\n", blindness.line());
+    return kBadInput;
+  }
+  const double settling = model.filter.settle / (model.filter.beta * model.measurement.nominal_step);
+  if (static_cast<double>(torque.decisions()) + settling < 0.5 * static_cast<double>(lines)) {
+    tell("wheelwright detect: standard input: {}\n", why_mostly_undecided(torque.decisions(), lines, {}));
     return kBadInput;
   }
   return kDone;

@@ -145,20 +145,20 @@ std::string origin(const Arguments& a, const Diagnosis& d) {
 }
 
 void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& next, const Robot& robot) {
-  const std::filesystem::path& out = a.common.out;
+  const std::filesystem::path out = gathered(a.common);
   results::write_residuals(out / kResiduals, d.series);
   // What an earlier run left would contradict this one.
   if (d.improved) {
     files::atomic_write(out / kImproved,
                         origin(a, d) + robots::robot_yaml(*d.improved) + robots::columns_yaml(a.common.columns));
   } else {
-    std::filesystem::remove(out / kImproved);
+    drop(a.common, kImproved);
   }
   if (next.commands) {
     write_drive(out, kNext, *next.commands, robot);
   } else {
     for (const std::string& file : drive_files(kNext)) {
-      std::filesystem::remove(out / file);
+      drop(a.common, file);
     }
   }
 }
@@ -239,9 +239,9 @@ std::vector<robots::EditedSimulator> write_simulators(const Arguments& a, const 
     const robots::EditedSimulator& edit = edits.back();
     const std::string name = edited_name(source.path);
     if (edit.changed.empty()) {
-      std::filesystem::remove(a.common.out / name);
+      drop(a.common, name);
     } else {
-      files::atomic_write(a.common.out / name, edit.text);
+      files::atomic_write(gathered(a.common) / name, edit.text);
     }
     result["simulators"].push_back(
         robots::to_json(edit, source.path.string(), edit.changed.empty() ? std::string() : name));
@@ -371,7 +371,7 @@ int run(const Arguments& a) {
           files ? report::gap_report(diagnosis, robot.name, context, promise) : std::string());
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
-    say("{}", summary(diagnosis, {files ? (a.common.out / "").string() : "", a.robot.string(),
+    say_lines(summary(diagnosis, {files ? (a.common.out / "").string() : "", a.robot.string(),
                                   files && diagnosis.improved, promise, files && next.commands, a.naive, naive}));
     say_simulators(a, sources, edits, catalogue);
     if (files) {

@@ -87,7 +87,7 @@ int run(const Arguments& a) {
           report::identify_report(result, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(context.warnings);
-    say("{}", summary(result));
+    say_lines(summary(result));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "identification.json").string(),
           (a.common.out / "report.html").string());

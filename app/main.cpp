@@ -2,8 +2,10 @@
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
+#include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <exception>
 #include <memory>
@@ -114,8 +116,10 @@ int run(int argc, char** argv) {
     return kBadInput;
   } catch (const CLI::ParseError& error) {
     return program.exit(error) == 0 ? kDone : kBadInput;
+  } catch (const OutputLost&) {
+    return kBadInput;
   } catch (const wheelwright::Error& error) {
-    tell("wheelwright: {}\n", error.what());
+    tell_error(error.what());
     return kBadInput;
   } catch (const std::bad_alloc&) {
     tell("wheelwright: not enough memory for this input: expected a shorter log, fewer threads or a larger machine\n");
@@ -136,10 +140,23 @@ static void keep_freed_memory() {
 #endif
 }
 
+// A file that is opened takes the lowest descriptor that is free: where a standard stream is closed, results would be
+// mixed with what is printed. Its place is taken by a descriptor that can be neither read nor written, so that the loss
+// of what was to stand there is noticed as that of a closed stream is.
+static void occupy_closed_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(stream, F_GETFD) == -1 && errno == EBADF && open("/", O_PATH) != stream) {
+      _exit(kInternal);
+    }
+  }
+}
+
 int main(int argc, char** argv) {
+  occupy_closed_streams();
   keep_freed_memory();
   end_when_interrupted();
   const int code = run(argc, argv);
+  discard_gathered();
   remove_empty_directories();
   return finished(code);
 }

@@ -121,10 +121,10 @@ int run(const Arguments& a) {
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
     for (const commission::ResidualMargins& residual : survey.residuals) {
-      say("{}{}\n", table(survey, residual), certain_meaning(residual.warrant));
+      say_lines(table(survey, residual) + certain_meaning(residual.warrant) + "\n");
     }
     if (survey.at_risk) {
-      say("{}{}\n", risk_table(survey), risk_meaning(*survey.at_risk));
+      say_lines(risk_table(survey) + risk_meaning(*survey.at_risk) + "\n");
     }
     if (!survey.without_kinematic.empty()) {
       say("no kinematic residual: {}\n", survey.without_kinematic);

@@ -63,6 +63,7 @@ int run(const Arguments& a) {
     throw InputError("--out-file and --out: two places for one file: expected one of them");
   }
   const std::filesystem::path target = a.common.out.empty() ? a.file : a.common.out / "robot.yaml";
+  keep_inputs(target, {a.urdf, a.ros2_control});
   keep_existing(a.common, target);
   const robots::RobotWithOrigins robot = made(a);
   const std::string text = robots::robot_yaml(robot);
@@ -74,7 +75,7 @@ int run(const Arguments& a) {
   if (a.common.json) {
     say_json(robots::to_json(robot, results::software()));
   } else if (target.empty()) {
-    say("{}", text);
+    say_lines(text);
   } else if (!a.common.quiet) {
     say("wrote {}\n", target.string());
     for (const std::string& remark : robot.remarks) {

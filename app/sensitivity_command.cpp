@@ -108,7 +108,7 @@ int run(const Arguments& a) {
           a.common.out.empty() ? std::string() : report::sensitivity_report(study, result, local, file.notes, context));
   if (!a.common.quiet && !a.common.json) {
     print_log(file.notes);
-    say("{}", summary(study, result, local));
+    say_lines(summary(study, result, local));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "sensitivity.json").string(), (a.common.out / "report.html").string());
     }

@@ -68,7 +68,7 @@ Run add_completion(CLI::App& program) {
   command.add_option("SHELL", *shell, "The shell")->required()->check(CLI::IsMember({"bash", "zsh", "fish"}));
   add_footer(command, kCompletionExamples);
   return [shell, &program](const std::string&) {
-    say("{}", completion(words_of(program), *shell));
+    say_lines(completion(words_of(program), *shell));
     return kDone;
   };
 }
@@ -94,7 +94,7 @@ Run add_man(CLI::App& program) {
       throw InputError(fmt::format("man: there is no command {}: expected one of {}{}", files::shown(a->command),
                                    core::listed(names), files::did_you_mean(a->command, names)));
     }
-    say("{}", one == nullptr ? manual_page(words, results::software()) : manual_page(*one, results::software()));
+    say_lines(one == nullptr ? manual_page(words, results::software()) : manual_page(*one, results::software()));
     return static_cast<int>(kDone);
   };
 }

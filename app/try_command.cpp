@@ -240,6 +240,24 @@ struct Page {
   }
 };
 
+// A robot file that stands for a run that did not come to its end, and would be taken for the user's.
+class Unfinished {
+ public:
+  explicit Unfinished(std::filesystem::path file) : file_(std::move(file)), mine_(!std::filesystem::exists(file_)) {}
+  ~Unfinished() {
+    if (std::error_code ignored; mine_) {
+      std::filesystem::remove(file_, ignored);
+    }
+  }
+  Unfinished(const Unfinished&) = delete;
+  Unfinished& operator=(const Unfinished&) = delete;
+  void keep() { mine_ = false; }
+
+ private:
+  std::filesystem::path file_;
+  bool mine_;
+};
+
 /// Runs another command with its own options; false, with the reason in `why`, where it refuses.
 bool call(Run (*add)(CLI::App&), std::vector<std::string> words, std::string& why) {
   CLI::App program;
@@ -331,9 +349,12 @@ int run(const Arguments& given) {
   took.push_back(fmt::format("columns of the log: {}", core::listed(log->columns())));
   const std::vector<std::string> read = logs::sentences(log->report());
   took.insert(took.end(), read.begin(), read.end());
-  make_directory(a.common, {"try.json", "robot.yaml"});
+  std::optional<Unfinished> unfinished;
+  make_directory(a.common, yaml.empty() ? std::vector<std::string>{"try.json"}
+                                        : std::vector<std::string>{"try.json", "robot.yaml"});
   if (!yaml.empty()) {
     static_cast<void>(robots::parse_robot(yaml, file.string()));
+    unfinished.emplace(file);
     files::atomic_write(file, yaml);
     a.robot = file;
   }
@@ -423,6 +444,9 @@ int run(const Arguments& given) {
   result["sentences"] = said;
   result["taken"] = took;
   publish(a.common, result, "try.json", report::page(page.content));
+  if (unfinished) {
+    unfinished->keep();
+  }
   if (!a.common.quiet && !a.common.json) {
     say("{}\n", verdict);
     for (const std::string& sentence : said) {

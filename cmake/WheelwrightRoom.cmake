@@ -20,9 +20,18 @@ if(CMAKE_UNITY_BUILD)
   list(APPEND WHEELWRIGHT_WARNINGS $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endif()
 
+# What stands between a mistake of ours and somebody who wants to make use of it: for what reads bytes of others, in releases.
+set(WHEELWRIGHT_HARDENING "")
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_SYSTEM_NAME STREQUAL Linux)
+  set(WHEELWRIGHT_HARDENING -fstack-protector-strong -fstack-clash-protection -U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=2)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+    list(APPEND WHEELWRIGHT_HARDENING -fcf-protection)
+  endif()
+endif()
+
 # The last -O counts. Results do not depend on it: no fused operations, no -ffast-math.
 function(wheelwright_words target)
-  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_compile_options(${target} PRIVATE "$<$<CONFIG:Release>:-O1;${WHEELWRIGHT_HARDENING}>")
 endfunction()
 
 # What nearly every source includes is read once. Only where sources are compiled by the dozen: elsewhere each shows by

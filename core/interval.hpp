@@ -8,15 +8,25 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 namespace wheelwright::core {
 
-/// The next double below `x`; −infinity stays.
-inline double round_down(double x) { return std::nextafter(x, -std::numeric_limits<double>::infinity()); }
-/// The next double above `x`; +infinity stays.
-inline double round_up(double x) { return std::nextafter(x, std::numeric_limits<double>::infinity()); }
+/// The next double above `x` (std::nextafter, without a call); +infinity and what is no number stay.
+inline double round_up(double x) {
+  if (!(x < std::numeric_limits<double>::infinity())) {
+    return x;
+  }
+  // Doubles of one sign follow each other as their bits do.
+  const auto bits = std::bit_cast<std::int64_t>(x);
+  const bool zero = bits == 0 || bits == std::numeric_limits<std::int64_t>::min();
+  return std::bit_cast<double>(zero ? std::int64_t{1} : bits > 0 ? bits + 1 : bits - 1);
+}
+/// The next double below `x`; −infinity and what is no number stay.
+inline double round_down(double x) { return -round_up(-x); }
 
 /// A closed interval [lower, upper]; lower <= upper wherever it is an answer.
 struct Interval {

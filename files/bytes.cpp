@@ -3,11 +3,14 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <new>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -42,6 +45,31 @@ std::string Xxh64::text() const { return fmt::format("xxh64:{:016x}", digest());
 namespace {
 
 constexpr std::size_t bytes_at_once = std::size_t{1} << 18;
+constexpr std::uint64_t always_unpacked = std::uint64_t{1} << 26;
+constexpr std::uint64_t largest_ratio = 100;
+
+}  // namespace
+
+bool is_zstd(std::string_view head) {
+  const bool skippable =
+      head.size() >= 4 && (static_cast<unsigned char>(head[0]) & 0xF0U) == 0x50U && head.substr(1, 3) == "\x2A\x4D\x18";
+  return skippable || head.starts_with("\x28\xB5\x2F\xFD");
+}
+
+std::uint64_t most_unpacked(std::uint64_t packed) {
+  return packed > std::numeric_limits<std::uint64_t>::max() / largest_ratio
+             ? std::numeric_limits<std::uint64_t>::max()
+             : std::max(always_unpacked, largest_ratio * packed);
+}
+
+std::string too_much_unpacked(std::uint64_t packed) {
+  return fmt::format(
+      "more than {} bytes come out of its {}: expected at most {}, or {} times its size; unpack it first, or read a "
+      "log with --trust",
+      most_unpacked(packed), packed, always_unpacked, largest_ratio);
+}
+
+namespace {
 
 /// The file itself, with count and hash of what was read.
 class RawFile {
@@ -81,10 +109,12 @@ class RawFile {
   Xxh64 hash_;
 };
 
-/// What the three kinds share: the raw file and its first bytes, already read.
+/// What the three kinds share: the raw file and its first bytes, already read; the bytes of all of it, or none where
+/// what comes out is not limited.
 class FileSource : public ByteSource {
  public:
-  FileSource(RawFile raw, std::string head) : raw_(std::move(raw)), pending_(std::move(head)) {}
+  FileSource(RawFile raw, std::string head, std::optional<std::uint64_t> packed)
+      : raw_(std::move(raw)), packed_(packed), pending_(std::move(head)) {}
   [[nodiscard]] std::uint64_t file_bytes() const override { return raw_.bytes(); }
   [[nodiscard]] std::string hash() const override { return raw_.hash(); }
 
@@ -99,9 +129,20 @@ class FileSource : public ByteSource {
     }
     return raw_.read(to, size);
   }
+
+  /// Counts unpacked bytes; returns how many they are.
+  std::size_t count(std::size_t size) {
+    unpacked_ += size;
+    if (packed_ && unpacked_ > most_unpacked(*packed_)) {
+      raw_.fail(too_much_unpacked(*packed_));
+    }
+    return size;
+  }
   RawFile raw_;
 
  private:
+  std::optional<std::uint64_t> packed_;
+  std::uint64_t unpacked_ = 0;
   std::string pending_;
   std::size_t head_used_ = 0;
 };
@@ -115,7 +156,8 @@ class PlainSource final : public FileSource {
 
 class GzipSource final : public FileSource {
  public:
-  GzipSource(RawFile raw, std::string head) : FileSource(std::move(raw), std::move(head)), buffer_(bytes_at_once) {
+  GzipSource(RawFile raw, std::string head, std::optional<std::uint64_t> packed)
+      : FileSource(std::move(raw), std::move(head), packed), buffer_(bytes_at_once) {
     if (inflateInit2(&stream_, 15 + 16) != Z_OK) {
       throw Error("zlib cannot start");
     }
@@ -149,7 +191,7 @@ class GzipSource final : public FileSource {
                   "): expected a valid file");
       }
     }
-    return wanted - stream_.avail_out;
+    return count(wanted - stream_.avail_out);
   }
   [[nodiscard]] const char* packing() const override { return "gzip"; }
 
@@ -161,8 +203,8 @@ class GzipSource final : public FileSource {
 
 class ZstdSource final : public FileSource {
  public:
-  ZstdSource(RawFile raw, std::string head)
-      : FileSource(std::move(raw), std::move(head)), buffer_(bytes_at_once), stream_(ZSTD_createDStream()) {
+  ZstdSource(RawFile raw, std::string head, std::optional<std::uint64_t> packed)
+      : FileSource(std::move(raw), std::move(head), packed), buffer_(bytes_at_once), stream_(ZSTD_createDStream()) {
     if (!stream_) {
       throw Error("zstd cannot start");
     }
@@ -186,7 +228,7 @@ class ZstdSource final : public FileSource {
       }
       between_frames_ = status == 0;
     }
-    return out.pos;
+    return count(out.pos);
   }
   [[nodiscard]] const char* packing() const override { return "zstd"; }
 
@@ -221,7 +263,7 @@ constexpr std::array<Magic, 9> not_text = {{{"PK\x03\x04", "a zip archive"},
 
 }  // namespace
 
-std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool hashed) {
+std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool hashed, bool unlimited) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   if (!std::filesystem::exists(status)) {
@@ -240,18 +282,20 @@ std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool h
     raw.fail("is empty: expected text");
   }
   const std::string_view start = head;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  const std::optional<std::uint64_t> packed = unlimited || error ? std::nullopt : std::optional<std::uint64_t>(size);
   if (start.starts_with("\x1F\x8B")) {
-    return std::make_unique<GzipSource>(std::move(raw), std::move(head));
+    return std::make_unique<GzipSource>(std::move(raw), std::move(head), packed);
   }
-  if (start.starts_with("\x28\xB5\x2F\xFD")) {
-    return std::make_unique<ZstdSource>(std::move(raw), std::move(head));
+  if (is_zstd(start)) {
+    return std::make_unique<ZstdSource>(std::move(raw), std::move(head), packed);
   }
   for (const Magic& magic : not_text) {
     if (start.starts_with(magic.bytes)) {
       raw.fail("is " + std::string(magic.format) + ": expected text, plain or packed with gzip or zstd");
     }
   }
-  return std::make_unique<PlainSource>(std::move(raw), std::move(head));
+  return std::make_unique<PlainSource>(std::move(raw), std::move(head), std::nullopt);
 }
 
 namespace {

@@ -54,9 +54,21 @@ class ByteSource {
   [[nodiscard]] virtual const char* packing() const = 0;
 };
 
+/// True if `head`, the first bytes of a file, begins a zstd stream: a frame, or one to be skipped.
+[[nodiscard]] bool is_zstd(std::string_view head);
+
+/// Bytes that may come out of a packed file of `packed` bytes: 64 MiB, or 100 times its size. Logs are packed to a
+/// twentieth of their size; a file that is made to fill a disk, to a ten thousandth.
+[[nodiscard]] std::uint64_t most_unpacked(std::uint64_t packed);
+
+/// "more than 67108864 bytes come out of its 1042: expected …", when that was too much for a file of `packed` bytes.
+[[nodiscard]] std::string too_much_unpacked(std::uint64_t packed);
+
 /// Opens `path`. Throws InputError, naming it, when it is missing, a directory, not a regular file, empty, unreadable,
-/// or a known format that is not text (zip, SQLite, HDF5, MCAP, xz, bzip2, UTF-16).
-[[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool hashed = false);
+/// or a known format that is not text (zip, SQLite, HDF5, MCAP, xz, bzip2, UTF-16). Its source throws, without
+/// `unlimited`, where more than most_unpacked() bytes come out.
+[[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool hashed = false,
+                                                     bool unlimited = false);
 
 /// What comes from the open descriptor `descriptor`, as it comes: read() waits for the first byte only. It is neither
 /// unpacked nor hashed; `name` is for messages.

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <unordered_set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,22 +18,109 @@
 namespace wheelwright::files {
 namespace {
 
-constexpr std::size_t longest_json = std::size_t{1} << 30;
-constexpr int deepest = 200;
+constexpr std::size_t longest_json = std::size_t{1} << 26;
+constexpr std::size_t deepest = 200;
+constexpr std::size_t most_values = 2'000'000;
+constexpr std::size_t most_members = 10'000;  // of one object
 
-/// Counts depth while parsing: what is nested deeper than any result of ours is not read.
-class DepthCheck {
+/// Builds a document event by event. What no result of ours is (too deep, too many values, a key twice) is refused
+/// where it is met: work and memory are bounded by the limits, and are linear in the text below them.
+class DocumentBuilder final : public nlohmann::json_sax<Json> {
  public:
-  explicit DepthCheck(const std::string& file) : file_(file) {}
-  bool operator()(int depth, Json::parse_event_t, Json&) const {
-    if (depth > deepest) {
-      throw InputError(fmt::format("{}: nested more than {} deep: expected a result file", file_, deepest));
+  explicit DocumentBuilder(const std::string& file) : file_(file) {}
+
+  [[nodiscard]] Json take() { return std::move(root_); }
+
+  bool null() override { return put(nullptr); }
+  bool boolean(bool value) override { return put(value); }
+  bool number_integer(std::int64_t value) override { return put(value); }
+  bool number_unsigned(std::uint64_t value) override { return put(value); }
+  bool number_float(double value, const std::string&) override { return put(value); }
+  bool string(std::string& value) override { return put(std::move(value)); }
+  bool binary(Json::binary_t& value) override { return put(std::move(value)); }
+  bool start_object(std::size_t) override { return open(Json::object()); }
+  bool start_array(std::size_t) override { return open(Json::array()); }
+  bool end_object() override { return close(); }
+  bool end_array() override { return close(); }
+  bool key(std::string& name) override {
+    Level& level = levels_.back();
+    if (level.keys.size() == most_members) {
+      refuse(fmt::format("more than {} members: expected a result file", most_members));
+    }
+    level.key = name;
+    if (!level.keys.insert(name).second) {
+      refuse("stands there twice: expected it once");
     }
     return true;
   }
+  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception& error) override {
+    if (const auto* const syntax = dynamic_cast<const Json::parse_error*>(&error)) {
+      throw *syntax;
+    }
+    throw InputError(fmt::format("{}: {}: expected JSON", file_, error.what()));
+  }
 
  private:
+  struct Level {
+    Json* container = nullptr;
+    std::string key{};                       // of the member that is being read
+    std::unordered_set<std::string> keys{};  // of an object so far
+  };
+
+  template <typename Value>
+  Json* placed(Value&& value) {
+    if (++values_ > most_values) {
+      refuse(fmt::format("more than {} values: expected a result file", most_values));
+    }
+    if (levels_.empty()) {
+      root_ = std::forward<Value>(value);
+      return &root_;
+    }
+    Level& level = levels_.back();
+    if (level.container->is_array()) {
+      return &level.container->get_ref<Json::array_t&>().emplace_back(std::forward<Value>(value));
+    }
+    // As a plain list: the object itself would look through all its members for the key.
+    Json::object_t::Container& members = level.container->get_ref<Json::object_t&>();
+    members.emplace_back(level.key, std::forward<Value>(value));
+    return &members.back().second;
+  }
+  template <typename Value>
+  bool put(Value&& value) {
+    placed(std::forward<Value>(value));
+    return true;
+  }
+  bool open(Json container) {
+    if (levels_.size() == deepest) {
+      refuse(fmt::format("nested more than {} deep: expected a result file", deepest));
+    }
+    Json* const at = placed(std::move(container));
+    levels_.push_back({.container = at});
+    return true;
+  }
+  bool close() {
+    levels_.pop_back();
+    return true;
+  }
+  [[noreturn]] void refuse(const std::string& why) const {
+    std::string pointer;
+    for (const Level& level : levels_) {
+      const std::size_t index = level.container->size() - (&level == &levels_.back() ? 0 : 1);
+      pointer += "/" + (level.container->is_array() ? std::to_string(index) : level.key);
+      if (pointer.size() > longest_pointer) {
+        pointer = pointer.substr(0, longest_pointer) + "...";
+        break;
+      }
+    }
+    throw InputError(fmt::format("{}: {}: {}", file_, pointer.empty() ? "/" : pointer, why));
+  }
+
+  static constexpr std::size_t longest_pointer = 200;
+
   const std::string& file_;
+  Json root_;
+  std::vector<Level> levels_;
+  std::size_t values_ = 0;
 };
 
 }  // namespace
@@ -44,7 +133,9 @@ void write_json(const std::filesystem::path& path, const Json& value) { atomic_w
 
 Json parse_json(std::string_view text, const std::string& file) {
   try {
-    return Json::parse(text.begin(), text.end(), DepthCheck(file));
+    DocumentBuilder builder(file);
+    Json::sax_parse(text.begin(), text.end(), &builder);
+    return builder.take();
   } catch (const Json::parse_error& error) {
     const std::size_t byte = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
     const std::string_view before = text.substr(0, byte);

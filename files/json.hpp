@@ -28,10 +28,12 @@ using Json = nlohmann::ordered_json;
 /// Writes json_text(value) and a line end to `path`, whole or not at all. Throws InputError as AtomicFile does.
 void write_json(const std::filesystem::path& path, const Json& value);
 
-/// Reads `text`; `file` is for messages. Throws InputError, naming file, line and column, when it is no JSON.
+/// Reads `text`; `file` is for messages. Throws InputError, naming file, line and column, when it is no JSON, and, naming
+/// file and key, for a key that stands twice in an object, more than 2'000'000 values, 10'000 members of one object or
+/// 200 levels.
 [[nodiscard]] Json parse_json(std::string_view text, const std::string& file);
 
-/// Reads the JSON file `path` (plain, gzip or zstd; up to 1 GiB). Throws InputError as open_bytes and parse_json do.
+/// Reads the JSON file `path` (plain, gzip or zstd; up to 64 MiB). Throws InputError as open_bytes and parse_json do.
 [[nodiscard]] Json read_json(const std::filesystem::path& path);
 
 /// A place in a JSON document, which must outlive it. What is missing or of another kind throws InputError

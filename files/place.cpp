@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_set>
 
 #include <fmt/format.h>
 #include <tinyxml2.h>
@@ -74,6 +75,7 @@ std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members_of(const std::
     fail("keys with values" + of);
   }
   std::vector<std::pair<std::string, YamlPlace>> out;
+  std::unordered_set<std::string> names;
   for (const auto& member : node_->node) {
     const YamlPlace at_key(node_->with(member.first), key_);
     if (!member.first.IsScalar()) {
@@ -85,7 +87,7 @@ std::vector<std::pair<std::string, YamlPlace>> YamlPlace::members_of(const std::
                              core::listed(*known), did_you_mean(name, *known)));
     }
     const std::string full = key_.empty() ? name : key_ + "." + name;
-    if (std::any_of(out.begin(), out.end(), [&](const auto& before) { return before.first == name; })) {
+    if (!names.insert(name).second) {
       at_key.say(full + " stands there twice: expected it once");
     }
     out.emplace_back(name, YamlPlace(node_->with(member.second), full));
@@ -170,6 +172,37 @@ std::string_view without_blanks(std::string_view text) {
   return begin == std::string_view::npos ? "" : text.substr(begin, text.find_last_not_of(blanks) + 1 - begin);
 }
 
+// The parser compares each attribute of a tag with all before it: tags that no file has are refused before it begins.
+void refuse_long_tags(std::string_view text, const std::string& file) {
+  constexpr std::size_t most_attributes = 1000;
+  const auto behind = [&](std::size_t from, std::string_view end) {
+    const std::size_t at = text.find(end, from);
+    return at == std::string_view::npos ? text.size() : at + end.size();
+  };
+  for (std::size_t at = text.find('<'); at < text.size(); at = text.find('<', at)) {
+    const std::string_view tag = text.substr(at);
+    if (tag.starts_with("<!--")) {
+      at = behind(at + 4, "-->");
+    } else if (tag.starts_with("<![CDATA[")) {
+      at = behind(at, "]]>");
+    } else if (tag.starts_with("<?")) {
+      at = behind(at, "?>");
+    } else {
+      const std::size_t begin = at;
+      std::size_t attributes = 0;
+      for (++at; at < text.size() && text[at] != '>'; ++at) {
+        if (text[at] == '"' || text[at] == '\'') {
+          at = behind(at + 1, text.substr(at, 1)) - 1;
+        } else if (text[at] == '=' && ++attributes > most_attributes) {
+          throw InputError(fmt::format(
+              "{}:{}: an element with more than {} attributes: expected a robot description", file,
+              1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(begin), '\n'), most_attributes));
+        }
+      }
+    }
+  }
+}
+
 void refuse_xacro(const tinyxml2::XMLElement& element, const std::string& file) {
   const auto refuse = [&](int line, const std::string& what) {
     throw InputError(fmt::format("{}:{}: {} is xacro, which has to be expanded first: xacro {} > robot.urdf", file,
@@ -207,6 +240,7 @@ XmlPlace XmlPlace::parse(std::string_view text, const std::string& file) {
   if (text.find('\0') != std::string_view::npos) {
     throw InputError(file + ": binary data: expected XML");
   }
+  refuse_long_tags(text, file);
   const auto document = std::make_shared<tinyxml2::XMLDocument>();
   if (document->Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     throw InputError(

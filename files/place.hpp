@@ -93,7 +93,8 @@ class YamlPlace {
 class XmlPlace {
  public:
   /// Parses `text` and gives its root element; `file` is for messages. Throws InputError, naming file and line, when it
-  /// is no XML, holds more than one root element, or an <xacro:...> that should have been expanded.
+  /// is no XML, holds more than one root element, an element with more than 1,000 attributes, or an <xacro:...> that
+  /// should have been expanded.
   static XmlPlace parse(std::string_view text, const std::string& file);
 
   /// Name of the element.

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <mutex>
 #include <set>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -89,10 +90,33 @@ int made(const fs::path& path, Temporary::Kind kind) {
   return descriptor;
 }
 
+constexpr std::string_view part = ".wheelwright-part";
+
+// What killed programs left in a directory under other names of their results, which nobody may write again. Once for a
+// directory: it may hold much.
+void bury_parts(const fs::path& stem, bool directory) {
+  static std::set<std::pair<fs::path, bool>> done;
+  if (!stem.filename().native().ends_with(part) || !done.emplace(stem.parent_path(), directory).second) {
+    return;
+  }
+  std::error_code error;
+  const fs::path folder = stem.has_parent_path() ? stem.parent_path() : fs::path(".");
+  for (auto entry = fs::directory_iterator(folder, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().native();
+    const std::size_t digits = name.find_last_not_of("0123456789") + 1;
+    if (digits < name.size() && std::string_view(name).substr(0, digits).ends_with(part) &&
+        living().paths.count(entry->path()) == 0) {
+      bury(entry->path(), directory);
+    }
+  }
+}
+
 }  // namespace
 
 Temporary::Temporary(const fs::path& stem, Kind kind, const std::string& shown, const std::string& expected) {
   const std::scoped_lock guard(living().mutex);
+  bury_parts(stem, kind != Kind::file);
   for (int number = 0, tries = 0; number < most_numbers && lock_ < 0 && tries < 2 * most_numbers; ++tries) {
     path_ = stem;
     path_ += std::to_string(number);

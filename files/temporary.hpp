@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Files and directories that are there for a while: gone with their object, with the program that is interrupted, or,
-/// where it was killed, with the next one of their name.
+/// where it was killed, with the next one of their name or beside it.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +15,8 @@ class Temporary {
  public:
   enum class Kind { file, directory, private_directory };
 
-  /// Makes `stem` + a number. Throws InputError, naming `shown` and `expected`, when that cannot be.
+  /// Makes `stem` + a number. Where `stem` ends in ".wheelwright-part", those that killed programs left in its directory
+  /// for other names are removed, too, at a program's first there. Throws InputError, naming `shown` and `expected`, when that cannot be.
   Temporary(const std::filesystem::path& stem, Kind kind, const std::string& shown, const std::string& expected);
   /// Removes it with all that is in it, unless move_to() did its work.
   ~Temporary();

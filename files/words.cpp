@@ -226,13 +226,17 @@ bool is_command(std::uint32_t c) {
 
 }  // namespace
 
-std::string printable(std::string_view text) {
+namespace {
+
+/// `text` with "\\x1B" for the bytes of what is no UTF-8 and of characters that `hidden` holds for.
+template <typename Hidden>
+std::string shown_bytes(std::string_view text, const Hidden& hidden) {
   std::string out;
   out.reserve(text.size());
   while (!text.empty()) {
     const auto [size, number] = first_character(text);
     const std::size_t taken = std::max<std::size_t>(size, 1);
-    if (size == 0 || is_command(number)) {
+    if (size == 0 || hidden(number)) {
       for (const char c : text.substr(0, taken)) {
         out += fmt::format("\\x{:02X}", static_cast<unsigned char>(c));
       }
@@ -240,6 +244,25 @@ std::string printable(std::string_view text) {
       out += text.substr(0, size);
     }
     text.remove_prefix(taken);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string printable(std::string_view text) { return shown_bytes(text, is_command); }
+
+std::string one_line(std::string_view text) {
+  return shown_bytes(text, [](std::uint32_t c) { return c == '\n' || c == '\t' || is_command(c); });
+}
+
+std::string valid_utf8(std::string_view text) {
+  std::string out;
+  out.reserve(text.size());
+  while (!text.empty()) {
+    const std::size_t size = first_character(text).first;
+    out += size == 0 ? std::string_view("\xEF\xBF\xBD") : text.substr(0, size);
+    text.remove_prefix(std::max<std::size_t>(size, 1));
   }
   return out;
 }

@@ -71,6 +71,12 @@ template <typename Value, std::size_t n>
 /// those that turn the direction of writing, and bytes that are no UTF-8 are "\\x1B". The rest is as it was.
 [[nodiscard]] std::string printable(std::string_view text);
 
+/// printable() without line ends and tabs, which are "\\x0A" and "\\x09": names from files, where a line holds one.
+[[nodiscard]] std::string one_line(std::string_view text);
+
+/// `text` with U+FFFD in place of each byte that is no UTF-8.
+[[nodiscard]] std::string valid_utf8(std::string_view text);
+
 /// True if `text` is UTF-8 (Unicode 15, table 3-7).
 [[nodiscard]] bool is_utf8(std::string_view text);
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <map>
 #include <numeric>
 
 #include <wheelwright/core/check.hpp>
@@ -512,6 +514,12 @@ Eigen::MatrixXd BlockGram::held_out_coefficients(const Subset& subset) const {
   return coefficients;
 }
 
+namespace {
+
+constexpr double kMostPieces = 9.0e15;  // of one block: their numbers are exact in a double
+
+}  // namespace
+
 Eigen::VectorXd held_out_pieces(const BlockGram& gram, const std::vector<RowSpace>& spaces, const Subset& subset,
                                 double length) {
   check::positive(length, "held_out_pieces length");
@@ -522,18 +530,29 @@ Eigen::VectorXd held_out_pieces(const BlockGram& gram, const std::vector<RowSpac
       continue;
     }
     const auto [from, to] = gram.interiors()[block];
-    const auto pieces = std::max<Eigen::Index>(1, static_cast<Eigen::Index>((to - from) / length));
-    const std::size_t first_piece = losses.size();
-    losses.resize(first_piece + static_cast<std::size_t>(pieces), 0.0);
+    const auto pieces = static_cast<std::int64_t>(std::clamp((to - from) / length, 1.0, kMostPieces));
+    std::vector<Range> ranges;
+    std::int64_t rows_inside = 0;
     for (const RowSpace& space : spaces) {
-      const Range rows = rows_within(space, gram.interiors()[block]);
+      ranges.push_back(rows_within(space, gram.interiors()[block]));
+      rows_inside += ranges.back().last - ranges.back().first;
+    }
+    std::map<std::int64_t, double> sums;
+    for (std::int64_t piece = 0; pieces <= rows_inside && piece < pieces; ++piece) {
+      sums[piece] = 0.0;
+    }
+    for (std::size_t s = 0; s < spaces.size(); ++s) {
+      const RowSpace& space = spaces[s];
+      const Range rows = ranges[s];
       const Eigen::VectorXd left = residual(space, subset, coefficients.col(static_cast<Eigen::Index>(block)),
                                             rows.first, rows.last - rows.first);
       for (Eigen::Index k = 0; k < left.size(); ++k) {
         const double place = (space.t[rows.first + k] - from) / (to - from) * static_cast<double>(pieces);
-        const auto piece = std::min(static_cast<Eigen::Index>(place), pieces - 1);
-        losses[first_piece + static_cast<std::size_t>(piece)] += std::pow(left[k] / space.floor, 2);
+        sums[std::min(static_cast<std::int64_t>(place), pieces - 1)] += std::pow(left[k] / space.floor, 2);
       }
+    }
+    for (const auto& [piece, sum] : sums) {
+      losses.push_back(sum);
     }
   }
   return Eigen::Map<const Eigen::VectorXd>(losses.data(), static_cast<Eigen::Index>(losses.size()));

@@ -147,8 +147,8 @@ class BlockGram {
 };
 
 /// Held-out losses as BlockGram::held_out_loss has them, of equal parts of the inner time of each block with rows, no
-/// shorter than `length` (s, > 0): neighbours of one block share their coefficients, not their rows. `spaces` are those
-/// of `gram`.
+/// shorter than `length` (s, > 0): neighbours of one block share their coefficients, not their rows. Of a block with
+/// more parts than rows, as where the clock jumps, those without rows are left out. `spaces` are those of `gram`.
 [[nodiscard]] Eigen::VectorXd held_out_pieces(const BlockGram& gram, const std::vector<RowSpace>& spaces,
                                               const Subset& subset, double length);
 

@@ -71,8 +71,8 @@ void judge_prior(const ModelClaims& claims, ModelCheck& result) {
   }
 }
 
-/// Driving to come is watched with no smaller errors than those that the set is proved with. The motion between samples
-/// is left out: commissioning bounds it for the log and for other driving by different means.
+/// Driving to come is watched with no smaller errors than those that the set is proved with. An acceleration is asked of
+/// it only where it is stated: commissioning may know one of the log and none of other driving.
 void judge_detector(const ModelClaims& claims, ModelCheck& result) {
   if (!claims.detector_errors) {
     return;
@@ -96,6 +96,22 @@ void judge_detector(const ModelClaims& claims, ModelCheck& result) {
   judge("joint_sample", Eigen::VectorXd::Constant(1, watched.joint_sample),
         Eigen::VectorXd::Constant(1, proved.joint_sample));
   judge("heading", Eigen::VectorXd::Constant(1, watched.heading), Eigen::VectorXd::Constant(1, proved.heading));
+  if (!proved.between_samples) {
+    return;
+  }
+  if (!watched.between_samples) {
+    result.failures.emplace_back(
+        "detector.error_bounds.between_samples is null: expected bounds of the motion between samples, with which the "
+        "set is proved");
+    return;
+  }
+  judge("between_samples.effort", watched.motion.effort, proved.motion.effort);
+  judge("between_samples.largest", watched.motion.largest, proved.motion.largest);
+  judge("between_samples.mobility", watched.motion.mobility.reshaped<Eigen::RowMajor>().eval(),
+        proved.motion.mobility.reshaped<Eigen::RowMajor>().eval());
+  if (watched.motion.limit.size() > 0) {
+    judge("between_samples.acceleration", watched.motion.limit, proved.motion.limit);
+  }
 }
 
 void judge_kinematic_prior(const KinematicClaims& claims, const Robot& robot, std::vector<std::string>& warnings) {

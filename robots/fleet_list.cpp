@@ -275,7 +275,7 @@ std::vector<FleetListRobot> read_directory(const fs::path& directory) {
     } else {
       continue;
     }
-    FleetListRobot robot = robot_of(entry.filename().string(), std::move(rows));
+    FleetListRobot robot = robot_of(files::one_line(entry.filename().string()), std::move(rows));
     if (is_folder(entry) && !is_bag(entry) && is_file(entry / "robot.yaml")) {
       robot.robot_file = entry / "robot.yaml";
     }

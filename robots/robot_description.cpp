@@ -18,7 +18,9 @@ using files::XmlPlace;
 
 namespace {
 
-constexpr double rounding = 1e-3;  // of the largest moment: files are written with three digits
+constexpr std::size_t most_parts = 5000;  // links, and joints: work grows with their number and how deep they hang
+constexpr std::size_t deepest = 200;      // joints between a link and the root
+constexpr double rounding = 1e-3;         // of the largest moment: files are written with three digits
 
 template <typename Items>
 auto* named(Items& items, const std::string& name) {
@@ -74,6 +76,10 @@ void require_tree(const RobotTree& tree) {
   if (tree.links.empty()) {
     tree.place.fail("holds no link: expected links with their masses");
   }
+  if (std::max(tree.links.size(), tree.joints.size()) > most_parts) {
+    tree.place.fail(fmt::format("{} links and {} joints: expected at most {} of each", tree.links.size(),
+                                tree.joints.size(), most_parts));
+  }
   require_unique(tree.links);
   require_unique(tree.joints);
   std::map<std::string, const TreeJoint*> above;
@@ -104,6 +110,9 @@ void require_tree(const RobotTree& tree) {
       if (++steps > tree.joints.size()) {
         up->place.fail("is part of a ring of joints: expected a tree");
       }
+    }
+    if (steps > deepest) {
+      link.place.fail(fmt::format("hangs on {} joints in a row: expected at most {}", steps, deepest));
     }
     if (root.empty()) {
       root = top;

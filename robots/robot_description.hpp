@@ -102,7 +102,8 @@ struct RobotTree {
 /// apart, since files are rounded).
 void require_possible(const TreeInertial& inertial);
 
-/// Throws InputError unless the names of links and joints stand there once, and the joints make one tree of the links.
+/// Throws InputError unless the names of links and joints stand there once, the joints make one tree of the links, and
+/// there are at most 5,000 of each, and 200 joints between a link and the root.
 void require_tree(const RobotTree& tree);
 
 /// Translation (m) and R = Rz(yaw) Ry(pitch) Rx(roll) (rad).

@@ -80,6 +80,9 @@ struct RobotReader {
   void read_basics(const std::string& key, const YamlPlace& place) {
     if (key == "name") {
       robot.name = place.text();
+      if (files::one_line(robot.name) != robot.name) {
+        place.fail("a name without line ends and control characters");
+      }
     } else if (key == "model") {
       const Names models = {"differential_drive", "single_axis"};
       robot.model = models[place.choice(models)];
@@ -328,7 +331,7 @@ ColumnMap read_columns(const std::filesystem::path& path, const std::vector<std:
       if (robot.contains("columns")) {
         columns = YamlPlace::parse(files::json_text(robot["columns"], -1), path.string() + ": /robot/columns");
       }
-    } else {
+    } else if (text.size() <= longest_robot_file) {  // else read_robot() refuses it
       for (const auto& [key, place] : YamlPlace::parse(text, path.string()).members()) {
         if (key == "columns") {
           columns = place;

@@ -18,7 +18,7 @@
 namespace wheelwright::robots {
 
 /// Bytes of the longest model.json that is read: as many as files::read_json() takes.
-inline constexpr std::size_t longest_model_file = std::size_t{1} << 30;
+inline constexpr std::size_t longest_model_file = std::size_t{1} << 26;
 
 inline constexpr files::Words<core::Warrant, 3> kWarrantWords{
     {{core::Warrant::guaranteed, core::warrant_word(core::Warrant::guaranteed)},

@@ -140,7 +140,7 @@ void read(const char* path) {
   while (bag->next(message)) {
     const logs::BagTopic& topic = bag->topics()[message.topic];
     std::vector<std::string> paths;
-    for (const std::string& list : logs::numeric_paths(topic.definition.value())) {
+    for (const std::string& list : logs::numeric_paths(*topic.definition)) {
       expand(list, paths);
     }
     logs::RosExtractor extractor(*topic.definition, paths);

@@ -299,6 +299,25 @@ TEST_F(Check, PremisesMayNotBeNarrowed) {
               HasSubstr("the prior of r_mass, [1, 3], is narrower than the robot's"));
 }
 
+// What a robot does between two samples widens its thresholds. A model whose detector takes nothing of it, so that a
+// healthy robot raises alarms, was said to be proved.
+TEST_F(Check, TheDetectorTakesTheMotionBetweenSamplesThatTheSetIsProvedWith) {
+  commission_shipped();
+  const auto between = [](Json& m) -> Json& { return m["detector"]["error_bounds"]["between_samples"]; };
+  EXPECT_THAT(failures([&](Json& m) { between(m) = nullptr; }), HasSubstr("detector.error_bounds.between_samples"));
+  EXPECT_THAT(failures([&](Json& m) { between(m)["effort"][1] = 0.0; }),
+              HasSubstr("detector.error_bounds.between_samples.effort[1] is 0: expected at least"));
+  EXPECT_THAT(failures([&](Json& m) { between(m)["mobility"][1][1] = 0.0; }),
+              HasSubstr("between_samples.mobility[3] is 0"));
+  EXPECT_THAT(failures([&](Json& m) { between(m)["mobility"] = between(m)["largest"] = Json::array(); }),
+              HasSubstr("between_samples.mobility[0] is 0"));
+  EXPECT_THAT(failures([&](Json& m) { between(m)["largest"][2] = 0.0; }), HasSubstr("between_samples.largest[2] is 0"));
+  EXPECT_THAT(failures([&](Json& m) {
+                between(m)["acceleration"] = {0.0, 0.0};
+              }),
+              HasSubstr("between_samples.acceleration[0] is 0"));
+}
+
 // tests/results/risk_check_test.cpp tries every kind of change.
 TEST_F(Check, WhatIsSaidAtARiskIsProvedOrRefused) {
   commission_shipped();

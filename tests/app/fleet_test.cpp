@@ -110,6 +110,39 @@ TEST_F(FleetCommand, FindsWhatIsWrongAndStopsForNothing) {
   }
 }
 
+// A layout of HDF5 in chunks without dimensions made the library divide by zero, which ended the whole run; a hostile
+// journal beside the results let SQLite delete any file.
+TEST_F(FleetCommand, AHostileFileEndsNeitherTheRunNorAnotherFile) {
+  std::filesystem::create_directories(path("fleet/sound"));
+  ASSERT_EQ(run("convert '" + (examples() / "healthy.csv.gz").string() + "' fleet/sound/monday.h5").code, 0);
+  std::string log = bytes(path("fleet/sound/monday.h5"));
+  const std::string sizes("\0\x20\0\0\x08\0\0\0", 8);
+  std::size_t changed = 0;
+  for (std::size_t at = log.find(sizes); at != std::string::npos; at = log.find(sizes, at + 1)) {
+    if (at >= 11 && log.compare(at - 11, 3, "\x03\x02\x02") == 0) {
+      log[at - 9] = '\1';
+      ++changed;
+    }
+  }
+  ASSERT_GT(changed, 0u);
+  std::filesystem::create_directories(path("fleet/hostile"));
+  put("fleet/hostile/monday.h5", log);
+  const Outcome done = run("fleet fleet --robot robot.yaml --quiet --json --out result");
+  EXPECT_EQ(done.code, 1) << done.err;
+  const Json json = Json::parse(done.out);
+  EXPECT_EQ(json["robots"]["status"]["commissioned"], 1);
+  EXPECT_EQ(json["robots"]["status"]["unreadable"], 1);
+  ASSERT_EQ(json["failed"].size(), 1u);
+  EXPECT_EQ(json["failed"][0]["robot"], "hostile");
+
+  const auto victim = put("victim.txt", "dear to somebody");
+  put("result/results.sqlite-journal", victim.string() + std::string("\xd9\xd5\x05\xf9\x20\xa1\x63\xd7", 8));
+  const Outcome refused = run("fleet fleet --robot robot.yaml --quiet --out result");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("results.sqlite-journal: names another file"));
+  EXPECT_TRUE(std::filesystem::exists(victim));
+}
+
 TEST_F(FleetCommand, HoweverItIsRunTheResultsAreTheSame) {
   make(6, 0, 10);
   ASSERT_EQ(fleet("one").code, 0);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Help, suggestions, completion and manual pages of every command, and units.
+#include <map>
 #include <regex>
 #include <set>
 
@@ -205,6 +206,94 @@ TEST_F(Manners, AFullOutputIsAnExitCode) {
   }
   EXPECT_EQ(code("doctor none.csv --robot robot.yaml > /dev/null 2> /dev/full"), 2);
   EXPECT_EQ(code("doctor none.csv --robot robot.yaml > /dev/null 2>&-"), 2);
+}
+
+// --json of some commands went into a full stream and came out as a success.
+TEST_F(Manners, AResultThatDidNotArriveIsNoSuccessOfAnyCommand) {
+  std::vector<std::string> some = healthy_lines();
+  some.resize(3001);
+  put_lines("log.csv", some);
+  put("drive.yaml",
+      "robot: robot.yaml\nparameters: {mass: 21.0, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_yaw: 0.5}\n"
+      "trajectory: {kind: commissioning, speed: 0.6, yaw_rate: 1.2, period: 3}\nduration: 5\nrate: 50\n"
+      "sensors: {noise: uniform, wheel_speed: 0.02, effort: 0.02}\n");
+  const std::string wheel =
+      "<link name='{0}'/><joint name='{0}' type='continuous'><parent link='base'/><child link='{0}'/>"
+      "<axis xyz='0 1 0'/><origin xyz='0 {1} 0'/></joint>";
+  put("robot.urdf",
+      "<robot name='r'><link name='base'><inertial><mass value='9'/>"
+      "<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link>" +
+          fmt::format(fmt::runtime(wheel), "left_wheel", 0.2) + fmt::format(fmt::runtime(wheel), "right_wheel", -0.2) +
+          "</robot>");
+  std::filesystem::create_directory(path("fleet"));
+  std::filesystem::copy_file(path("log.csv"), path("fleet/amy.csv"));
+  put("study.yaml",
+      "scenario: drive.yaml\ninputs: {duration: [4, 6]}\nquantities: [width]\n"
+      "methods: {one_at_a_time: {levels: 2}}\n");
+  ASSERT_LE(run("commission log.csv --robot robot.yaml --out model --quiet").code, 1);
+  const std::map<std::string, std::string> arguments = {
+      {"try", "log.csv --wheel-radius 0.0975 --track-width 0.381"},
+      {"commission", "log.csv --robot robot.yaml"},
+      {"detect", "log.csv --model model/model.json"},
+      {"doctor", "log.csv --robot robot.yaml"},
+      {"check", "model/model.json log.csv"},
+      {"compare", "model/model.json model/model.json"},
+      {"identify", "log.csv --robot robot.yaml"},
+      {"margins", "log.csv --model model/model.json --fault wheel_radius --window 1"},
+      {"sensitivity", "study.yaml"},
+      {"export", "model/model.json --language c --out header"},
+      {"design", "--robot robot.yaml --for bounds --speed 8 --acceleration 20 --duration 4 --stages 1 --rate 50"},
+      {"simulate", "drive.yaml --out made.csv"},
+      {"choose", "log.csv --robot robot.yaml"},
+      {"gap", "log.csv --robot robot.yaml --no-manoeuvre --no-shrink"},
+      {"fleet", "fleet --robot robot.yaml"},
+      {"convert", "log.csv other.csv"},
+      {"robot", "--urdf robot.urdf --wheel-radius 0.1 --massless left_wheel --massless right_wheel"}};
+  for (const std::string& command : commands()) {
+    if (!options(command).contains("--json")) {
+      continue;
+    }
+    ASSERT_TRUE(arguments.contains(command)) << command << ": how is it called?";
+    const std::string line = command + " " + arguments.at(command) + " --json --quiet --force";
+    const Outcome whole = run(line);
+    EXPECT_LE(whole.code, 1) << line << "\n" << whole.err;
+    EXPECT_FALSE(whole.out.empty()) << line;
+    EXPECT_EQ(run(line, "/dev/null", "sh -c 'exec \"$@\" > /dev/full' sh").code, 2) << line;
+  }
+}
+
+// A file's name that holds a line end made a line that the program seemed to have said.
+TEST_F(Manners, NamesMakeNoLinesOfTheirOwn) {
+  const std::string name = "a.csv\nThe log can be commissioned: \xFF.csv";
+  put_lines(name, healthy_lines());
+  const Outcome done = run("doctor '" + name + "' --robot robot.yaml --out found");
+  EXPECT_EQ(done.code, 0) << done.err;
+  for (const std::string& text : {done.out, run("doctor '" + name + ".gz' --robot robot.yaml").err}) {
+    for (const std::string& line : lines_of(text)) {
+      EXPECT_FALSE(line.starts_with("The log can be commissioned: ")) << text;
+    }
+  }
+  EXPECT_TRUE(files::is_utf8(bytes(path("found/report.html"))));
+  EXPECT_TRUE(files::is_utf8(bytes(path("found/doctor.json"))));
+
+  std::filesystem::create_directories(path("fleet/amy\n\x1B[31mbob"));
+  put_lines("fleet/amy\n\x1B[31mbob/log.csv", healthy_lines());
+  EXPECT_LE(run("fleet fleet --robot robot.yaml --out found --force --quiet").code, 1);
+  const std::string csv = bytes(path("found/fleet.csv"));
+  EXPECT_THAT(csv, HasSubstr("\namy\\x0A\\x1B[31mbob,"));
+  EXPECT_EQ(csv.find('\x1B'), std::string::npos);
+}
+
+// Keys of answers.json become words of a shell.
+TEST_F(Manners, WithheldCasesHaveNamesOfOurs) {
+  std::filesystem::create_directory(path("set"));
+  put("set/answers.json", R"json({"$(touch pwned)": {"effects": []}})json");
+  const std::string script = std::string(WHEELWRIGHT_SOURCE_DIR) + "/tools/withheld.sh";
+  const int status =
+      std::system(fmt::format("cd '{}' && sh '{}' --out out set > said 2>&1", directory_.string(), script).c_str());
+  EXPECT_NE(status, 0);
+  EXPECT_THAT(bytes(path("said")), HasSubstr("expected a name of letters, digits, _ and -"));
+  EXPECT_FALSE(std::filesystem::exists(path("pwned")));
 }
 
 TEST_F(Manners, WhatFilesSayIsNoCommandToTheTerminal) {

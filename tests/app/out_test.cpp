@@ -15,6 +15,9 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::Outcome;
 
+// Files of at most 50 kB: some of a result fit, and some do not.
+const std::string kFullDisk = "trap '' XFSZ; ulimit -f 100;";
+
 class Out : public testing::ProgramTest {
  protected:
   std::string healthy() const {
@@ -114,9 +117,62 @@ TEST_F(Out, AHeaderAndManualPagesOfOnesOwnAreWrittenAgain) {
   refuses(detect + " --out model", "model/report.html", "the page of `wheelwright commission`");
 }
 
+// A full disk left residuals.csv without gap.json, and the next run was refused: it was "not written by `gap`".
+TEST_F(Out, AFullDiskLeavesAllOfAnEarlierResultOrNothing) {
+  put_lines("log.csv", healthy_lines());
+  const std::string gap = "gap log.csv --robot robot.yaml --no-manoeuvre --no-shrink --quiet --out out/gap";
+  const Outcome first = run(gap, "/dev/null", kFullDisk);
+  EXPECT_EQ(first.code, 2) << first.err;
+  EXPECT_FALSE(fs::exists(path("out")));
+  ASSERT_EQ(run(gap).code, 0);
+  const std::vector<std::string> names = names_in("out/gap");
+  EXPECT_THAT(names, ::testing::IsSupersetOf({"gap.json", "report.html", "residuals.csv"}));
+  std::vector<std::string> before;
+  for (const std::string& name : names) {
+    before.push_back(bytes(path("out/gap/" + name)));
+  }
+  EXPECT_EQ(run(gap, "/dev/null", kFullDisk).code, 2);
+  EXPECT_EQ(names_in("out/gap"), names);
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    EXPECT_EQ(bytes(path("out/gap/" + names[k])), before[k]) << names[k];
+  }
+  EXPECT_EQ(run(gap).code, 0);
+
+  fs::create_directory(path("robots"));
+  fs::copy_file(examples() / "healthy.csv.gz", path("robots/amy.csv.gz"));
+  const std::string fleet = "fleet robots --robot robot.yaml --quiet --out out/fleet";
+  EXPECT_EQ(run(fleet, "/dev/null", kFullDisk).code, 2);
+  EXPECT_THAT(names_in("out/fleet"), ::testing::ElementsAre("results.sqlite"));  // from which it goes on
+  EXPECT_LE(run(fleet).code, 1);
+  EXPECT_THAT(names_in("out/fleet"), ::testing::IsSupersetOf({"fleet.csv", "fleet.json", "pooled_prior.yaml"}));
+}
+
 TEST_F(Out, AFailedRunLeavesNoDirectory) {
   EXPECT_EQ(run("doctor no.csv --robot robot.yaml --out a/b").code, 2);
   EXPECT_FALSE(fs::exists(path("a")));
+  // A directory within another one that failed, and the robot file that `try` made for itself: the next `try` took it
+  // for the user's.
+  put_lines("log.csv", healthy_lines());
+  const std::string first_try = "try log.csv --wheel-radius 0.0975 --track-width 0.381 --out a/b";
+  const Outcome outcome = run(first_try, "/dev/null", "trap '' XFSZ; ulimit -f 8;");
+  EXPECT_EQ(outcome.code, 2) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("a/b/doctor"));
+  EXPECT_FALSE(fs::exists(path("a")));
+}
+
+TEST_F(Out, WhatIsReadIsNotReplacedByForce) {
+  const std::string urdf = "<robot name=\"r\"><link name=\"base\"/><link name=\"left\"/><link name=\"right\"/></robot>";
+  put("robot.urdf", urdf);
+  for (const char* const option : {"--urdf", "--ros2-control"}) {
+    const Outcome outcome = run(fmt::format("robot {} robot.urdf --out-file ./robot.urdf --force", option));
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("robot.urdf: is what is read: expected another name"));
+    EXPECT_EQ(bytes(path("robot.urdf")), urdf);
+  }
+  put_lines("log.csv", healthy_lines());
+  const std::string log = bytes(path("log.csv"));
+  EXPECT_THAT(run("convert log.csv log.csv --force").err, HasSubstr("log.csv: is what is read"));
+  EXPECT_EQ(bytes(path("log.csv")), log);
 }
 
 }  // namespace

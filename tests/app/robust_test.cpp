@@ -262,21 +262,103 @@ TEST_F(Robust, AModelWithImpossibleNumbersIsNeitherUsedNorProved) {
   }
 }
 
+// A part of the memory was as large as the jump: 2.3 GB for 1.7e9 s, not enough of it for 1e10.
 TEST_F(Robust, AClockThatJumpsByDecadesIsDiagnosed) {
 #ifdef __SANITIZE_ADDRESS__
   const std::string little_memory;  // the sanitizer reserves terabytes of addresses
 #else
-  const std::string little_memory = "ulimit -v 4000000;";
+  const std::string little_memory = "ulimit -v 1000000;";
 #endif
-  std::vector<std::string> lines = healthy_lines();
-  for (std::size_t k = 4000; k < lines.size(); ++k) {
-    lines[k] = with_time(lines[k], 1.7e9 + 0.01 * static_cast<double>(k));
+  for (const double jump : {1.7e9, 1e10}) {
+    std::vector<std::string> lines = healthy_lines();
+    for (std::size_t k = 4000; k < lines.size(); ++k) {
+      lines[k] = fmt::format("{:.2f}{}", jump + 0.01 * static_cast<double>(k), lines[k].substr(lines[k].find(',')));
+    }
+    put_lines("log.csv", lines);
+    const Outcome outcome = run("gap log.csv --robot robot.yaml --no-manoeuvre --no-shrink --json --quiet --threads 2",
+                                "/dev/null", little_memory);
+    EXPECT_LE(outcome.code, 1) << outcome.err;
+    EXPECT_THAT(Json::parse(outcome.out).at("schema"), "wheelwright/gap/1");
   }
-  put_lines("log.csv", lines);
-  const Outcome outcome =
-      run("gap log.csv --robot robot.yaml --no-manoeuvre --no-shrink --json --quiet", "/dev/null", little_memory);
-  EXPECT_LE(outcome.code, 1) << outcome.err;
-  EXPECT_THAT(Json::parse(outcome.out).at("schema"), "wheelwright/gap/1");
+}
+
+// Half a log without a sensor was "no fault", and nothing said that half of it was not seen.
+TEST_F(Robust, WhatWasNotDecidedOnIsTold) {
+  commission_shipped();
+  put_changed(kHalf, kAll,
+              [](std::size_t, const std::string& line) { return line.substr(0, line.rfind(',')) + ",nan"; });
+  const Outcome half = run("detect log.csv --model model/model.json --out found");
+  EXPECT_THAT(half.out, HasSubstr("not watched: 50 % of the 12001 rows could not be decided on")) << half.err;
+  const Json found = files::read_json(path("found/detection.json"));
+  EXPECT_NEAR(found.at("undecided_share").get<double>(), 0.5, 0.001);
+  if (has_validator()) {
+    EXPECT_EQ(misfit("detection.schema.json", "found/detection.json"), "");
+  }
+  put_lines("log.csv", healthy_lines());
+  ASSERT_EQ(run("detect log.csv --model model/model.json --out found").code, 0);
+  EXPECT_FALSE(files::read_json(path("found/detection.json")).contains("undecided_share"));
+
+  // A stream that sees again at its end and was blind for most of it is not healthy.
+  put_changed(1000, 11800,
+              [](std::size_t, const std::string& line) { return line.substr(0, line.rfind(',')) + ",nan"; });
+  const Outcome stream = run("detect --follow --model model/model.json", "log.csv");
+  EXPECT_EQ(stream.code, 2);
+  EXPECT_THAT(stream.err, AllOf(HasSubstr("of 12001 rows could be decided on"), HasSubstr("standard input: only ")));
+}
+
+// With standard output closed the file of events had its number, and what was printed went into it.
+TEST_F(Robust, AClosedStreamIsNoFileOfTheRun) {
+  commission_shipped();
+  put_lines("log.csv", healthy_lines());
+  const std::string follow = "detect --follow --model model/model.json --heartbeat 60 --out ";
+  ASSERT_EQ(run(follow + "whole", "log.csv").code, 0);
+  const std::vector<std::string> expected = testing::lines_of(bytes(path("whole/events.jsonl")));
+  const auto closed = [&](const std::string& stream, const std::string& out) {
+    return run(follow + out, "log.csv", "sh -c 'exec \"$@\" " + stream + "' sh").code;
+  };
+  EXPECT_EQ(closed(">&-", "one"), 2);
+  const std::vector<std::string> kept = testing::lines_of(bytes(path("one/events.jsonl")));
+  ASSERT_FALSE(kept.empty());
+  EXPECT_TRUE(std::equal(kept.begin(), kept.end(), expected.begin())) << bytes(path("one/events.jsonl"));
+  EXPECT_EQ(closed("2>&-", "two"), 0);
+  EXPECT_EQ(testing::lines_of(bytes(path("two/events.jsonl"))), expected);
+  EXPECT_EQ(closed("<&-", "none"), 2);
+  EXPECT_EQ(closed("<&- >&- 2>&-", "nothing"), 2);
+}
+
+// It watched on to the end of the stream with nobody told of anything.
+TEST_F(Robust, AStreamThatNobodyIsToldOfEnds) {
+  commission_shipped();
+  put_lines("log.csv", healthy_lines());
+  const Outcome outcome = run("detect --follow --model model/model.json --heartbeat 10 --out watch", "log.csv",
+                              "sh -c 'exec \"$@\" > /dev/full' sh");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("standard output: cannot be written (No space left on device)"));
+  // The header, and the one line that could not be told.
+  EXPECT_EQ(testing::lines_of(bytes(path("watch/events.jsonl"))).size(), 2U);
+}
+
+// A full disk left half a line, and the next run wrote its header behind it.
+TEST_F(Robust, TheFileOfEventsHoldsWholeLines) {
+  commission_shipped();
+  put_lines("log.csv", healthy_lines());
+  const std::string follow = "detect --follow --model model/model.json --heartbeat 1 --out watch";
+  const Outcome full = run(follow, "log.csv", "trap '' XFSZ; ulimit -f 4;");
+  EXPECT_EQ(full.code, 2);
+  EXPECT_THAT(full.err, HasSubstr("watch/events.jsonl: cannot be written (File too large)"));
+  EXPECT_TRUE(bytes(path("watch/events.jsonl")).ends_with("}\n"));
+  const std::size_t before = testing::lines_of(bytes(path("watch/events.jsonl"))).size();
+  // A run that was killed.
+  std::ofstream(path("watch/events.jsonl"), std::ios::app) << R"({"watching":{"t":)";
+  EXPECT_EQ(run(follow, "log.csv").code, 0);
+  const std::vector<std::string> lines = testing::lines_of(bytes(path("watch/events.jsonl")));
+  EXPECT_GT(lines.size(), before + 100);
+  for (const std::string& line : lines) {
+    EXPECT_FALSE(Json::parse(line, nullptr, false).is_discarded()) << line;
+  }
+  put("watch/events.jsonl", R"({"schema":"wheelwright/events/1","soft)");
+  EXPECT_EQ(run(follow, "log.csv").code, 0);
+  EXPECT_EQ(Json::parse(testing::lines_of(bytes(path("watch/events.jsonl"))).front()).at("robot"), "example");
 }
 
 }  // namespace

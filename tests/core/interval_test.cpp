@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <boost/multiprecision/cpp_int.hpp>
@@ -57,6 +58,20 @@ TEST(Interval, RoundsByOneUnitInTheLastPlace) {
   EXPECT_EQ(round_up(0.0), std::numeric_limits<double>::denorm_min());
   EXPECT_EQ(round_up(kInfinity), kInfinity);
   EXPECT_EQ(round_down(-kInfinity), -kInfinity);
+  EXPECT_TRUE(std::isnan(round_up(std::nan(""))) && std::isnan(round_down(std::nan(""))));
+  using Limits = std::numeric_limits<double>;
+  Random random(3);
+  std::vector<double> all = {0.0, -0.0, 1.0, 0.5, Limits::min(), Limits::denorm_min(), Limits::max(), kInfinity};
+  for (int k = 0; k < 1000; ++k) {
+    all.push_back(wide(random));
+    all.push_back(std::ldexp(random.unit(), -1060));
+  }
+  for (const double size : all) {
+    for (const double x : {size, -size}) {
+      EXPECT_EQ(round_up(x), std::nextafter(x, kInfinity)) << x;
+      EXPECT_EQ(round_down(x), std::nextafter(x, -kInfinity)) << x;
+    }
+  }
 }
 
 TEST(Interval, NaNIsInNone) { EXPECT_FALSE((Interval{-kInfinity, kInfinity}.contains(std::nan("")))); }

@@ -44,6 +44,17 @@ TEST(Printable, BytesThatAreNoUtf8AreShown) {
   EXPECT_EQ(printable("\xF0\x9F\xA4"), "\\xF0\\x9F\\xA4");
 }
 
+// A file called "a.csv\nproved" made a line of its own.
+TEST(Printable, ANameStaysOnItsLine) {
+  EXPECT_EQ(one_line("a.csv\nproved\t\x1B[2J"), "a.csv\\x0Aproved\\x09\\x1B[2J");
+  EXPECT_EQ(one_line("µ.csv"), "µ.csv");
+}
+
+TEST(Utf8, IsMade) {
+  EXPECT_EQ(valid_utf8("a\xFF\xC3µ\n"), "a\xEF\xBF\xBD\xEF\xBF\xBDµ\n");
+  EXPECT_TRUE(is_utf8(valid_utf8("\xF0\x90\xFF\xED\xA0\x80")));
+}
+
 TEST(Utf8, IsTold) {
   for (const char* text : {"", "example", "ü", "€", "🤖", "\x7F"}) {
     EXPECT_TRUE(is_utf8(text)) << text;

@@ -62,6 +62,17 @@ TEST_F(Temporaries, WhatAKilledWriterLeftIsRemovedByTheNext) {
   EXPECT_EQ(bytes(path("log.csv")), "a log");
 }
 
+// A simulation that was killed leaves its part under a name that nobody writes again.
+TEST_F(Temporaries, WhatAKilledWriterLeftUnderAnotherNameIsRemovedToo) {
+  killed_after([&] { (new AtomicFile(path("monday.csv")))->write("half a log"); });
+  AtomicFile living(path("tuesday.csv"));
+  living.write("Tuesday");
+  put("notes.wheelwright-parts", "mine");
+  atomic_write(path("wednesday.csv"), "a log");
+  living.commit();
+  EXPECT_THAT(names(), ::testing::UnorderedElementsAre("tuesday.csv", "wednesday.csv", "notes.wheelwright-parts"));
+}
+
 TEST_F(Temporaries, ADirectoryOfAKilledProgramIsRemovedByTheNext) {
   const auto make = [&] { return new Temporary(path("copy-"), Temporary::Kind::private_directory, "it", "room"); };
   killed_after([&] { atomic_write(make()->path() / "large.db3", "bytes"); });

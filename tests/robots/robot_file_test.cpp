@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "support/scratch.hpp"
@@ -131,8 +132,22 @@ TEST_F(RobotFiles, FilesThatAreNone) {
   EXPECT_THAT(input_error([&] { (void)read_robot(put("b.yaml", std::string("a\0b", 3))); }), HasSubstr("binary data"));
   EXPECT_THAT(input_error([&] { (void)read_robot(put("u.yaml", "name: exam\xD7le\n" + least)); }),
               HasSubstr("u.yaml:1: name: 'exam?le': expected"));
+  EXPECT_THAT(input_error([&] { (void)read_robot(put("n.yaml", "name: \"a\\nproved\"\n" + least)); }),
+              HasSubstr("n.yaml:1: name: 'a?proved': expected a name without line ends"));
   EXPECT_THAT(input_error([&] { (void)read_robot(put("l.yaml", std::string(2000000, 'a'))); }),
               HasSubstr("longer than"));
+}
+
+// The columns were looked for in up to a GiB of a packed robot file, and 90,000 keys were compared with each other.
+TEST_F(RobotFiles, ColumnsAreLookedForInNoMoreThanARobotFile) {
+  EXPECT_TRUE(
+      read_columns(put("l.yaml", least + "columns: {t: time}\n# " + std::string(2'000'000, 'a')), {"t"}).empty());
+  std::string many = least;
+  for (int k = 0; k < 60'000; ++k) {
+    many += fmt::format("k{}: 1\n", k);
+  }
+  EXPECT_EQ(read_columns(put("m.yaml", many + "columns: {t: time}\n"), {"t"}).at("t"), "time");
+  EXPECT_THAT(input_error([&] { (void)read_robot(path("m.yaml")); }), HasSubstr("unknown key 'k0'"));
 }
 
 struct Bad {

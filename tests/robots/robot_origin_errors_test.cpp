@@ -3,6 +3,7 @@
 #include <functional>
 #include <regex>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/robots/controller_file.hpp>
@@ -48,6 +49,32 @@ std::string urdf_error(const std::string& text, const std::string& file) {
 
 std::string yaml_error(const std::string& text, const std::string& file, const std::string& controller = {}) {
   return input_error([&] { static_cast<void>(parse_ros2_control(text, file, controller)); });
+}
+
+// A chain of 60,000 links and an element of 400,000 attributes (6 MB each) were read for more than 20 s.
+TEST(RobotOriginErrors, WhatNoRobotHasIsRefusedByItsLimit) {
+  const auto chain = [](int links) {
+    std::string text = "<robot name=\"r\">\n";
+    for (int k = 0; k < links; ++k) {
+      text += fmt::format("<link name=\"l{}\"/>", k);
+    }
+    for (int k = 1; k < links; ++k) {
+      text +=
+          fmt::format(R"(<joint name="j{0}" type="fixed"><parent link="l{1}"/><child link="l{0}"/></joint>)", k, k - 1);
+    }
+    return text + "</robot>";
+  };
+  EXPECT_EQ(urdf_error(chain(60'000), "robot.urdf"),
+            "robot.urdf:1: robot 'r': 60000 links and 59999 joints: expected at most 5000 of each");
+  EXPECT_EQ(urdf_error(chain(300), "robot.urdf"),
+            "robot.urdf:2: link 'l201': hangs on 201 joints in a row: expected at most 200");
+  EXPECT_EQ(parse_urdf(chain(201), "robot.urdf").links.size(), 201u);
+  std::string attributes = "<!-- a=1 --><robot name='r'>\n<link name=\"a\"";
+  for (int k = 0; k < 400'000; ++k) {
+    attributes += fmt::format(" a{}='>'", k);
+  }
+  EXPECT_EQ(urdf_error(attributes + "/></robot>", "robot.urdf"),
+            "robot.urdf:2: an element with more than 1000 attributes: expected a robot description");
 }
 
 TEST(RobotOriginErrors, ValuesThatNoBodyHas) {
