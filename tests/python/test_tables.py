@@ -13,7 +13,8 @@ import numpy as np
 import wheelwright as ww
 from support import HEALTHY, SCENARIOS, commissioned, fault_file, healthy_log, path, robot, straight_log
 
-HOSTILE = '<script>alert("x")</script> & \'y\'\n\x1b[31m'
+HOSTILE = '<script>alert("x")</script> & \'y\''
+CONTROLS = "\n\x1b[31m"
 
 
 @functools.lru_cache(maxsize=None)
@@ -83,6 +84,10 @@ class Notebook(unittest.TestCase):
         for row, p in zip(rows, commissioned().parameters):
             self.assertEqual(row[:4], [p.name, f"{p.estimate:.5g}", f"[{p.lower:.5g}, {p.upper:.5g}]", p.unit])
         self.assertEqual(repr(commissioned()), "<wheelwright.Commission of example: done>")
+
+    def test_a_name_that_would_make_lines_or_colours_is_none(self):
+        with self.assertRaisesRegex(ww.InputError, "name: .*control characters"):
+            ww.Robot(**{**robot().to_dict(), "name": HOSTILE + CONTROLS})
 
     def test_a_hostile_name_is_escaped(self):
         named = ww.Robot(**{**robot().to_dict(), "name": HOSTILE})
