@@ -1,15 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The on-line detector: a whole step in C++ and as exported C, with the box and with the polytope, next to the same
 // filter with constant thresholds; the support function from the table next to the walk, and a threshold made of it.
-#include <dlfcn.h>
-
-#include <bit>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -25,6 +18,7 @@
 #include <wheelwright/sim/simulation.hpp>
 
 #include "bench.hpp"
+#include "compiled_c.hpp"
 #include "drive_rows.hpp"
 
 namespace wheelwright::bench::detector_bench {
@@ -97,47 +91,26 @@ struct World {
   }
 };
 
-/// The exported detector, compiled by `cc -O2` where there is one.
+/// The exported detector.
 class Exported {
  public:
-  Exported(const TorqueDetector& detector, std::size_t inputs) {
-    const auto folder =
-        std::filesystem::temp_directory_path() / fmt::format("wheelwright-bench-{}", std::random_device{}());
-    std::filesystem::create_directories(folder);
-    std::ofstream(folder / "robot.h") << exporter::c_header(detector, {.name = "robot"});
-    std::ofstream(folder / "robot.c") << fmt::format(
-        "#include \"robot.h\"\n"
-        "int robot_run(long rows, const double *t, const double *samples) {{\n"
-        "  robot_state s; robot_decision d; long k; int faults = 0;\n"
-        "  robot_init(&s);\n"
-        "  for (k = 0; k < rows; ++k) {{ robot_step(&s, t[k], samples + k * {}, &d); faults += d.fault; }}\n"
-        "  return faults;\n}}\n",
-        inputs);
-    const std::string command =
-        fmt::format("cc -std=c99 -O2 -ffp-contract=off -shared -fPIC -o '{0}/robot.so' '{0}/robot.c' -lm 2> /dev/null",
-                    folder.string());
-    if (std::system(command.c_str()) == 0) {
-      library_ = dlopen((folder / "robot.so").c_str(), RTLD_NOW | RTLD_LOCAL);
-    }
-    if (library_ != nullptr) {
-      run_ = std::bit_cast<int (*)(long, const double*, const double*)>(dlsym(library_, "robot_run"));
-    }
-    std::error_code ignored;
-    std::filesystem::remove_all(folder, ignored);
-  }
-  ~Exported() {
-    if (library_ != nullptr) {
-      dlclose(library_);
-    }
-  }
-  Exported(const Exported&) = delete;
-  Exported& operator=(const Exported&) = delete;
+  Exported(const TorqueDetector& detector, std::size_t inputs)
+      : compiled_(exporter::c_header(detector, {.name = "robot"}),
+                  fmt::format("#include \"robot.h\"\n"
+                              "int robot_run(long rows, const double *t, const double *samples) {{\n"
+                              "  robot_state s; robot_decision d; long k; int faults = 0;\n"
+                              "  robot_init(&s);\n"
+                              "  for (k = 0; k < rows; ++k) {{ robot_step(&s, t[k], samples + k * {}, &d); "
+                              "faults += d.fault; }}\n"
+                              "  return faults;\n}}\n",
+                              inputs)),
+        run_(compiled_.function<int(long, const double*, const double*)>("robot_run")) {}
   explicit operator bool() const { return run_ != nullptr; }
   void run(const World& w) const { DoNotOptimize(run_(static_cast<long>(World::rows), w.t.data(), w.samples.data())); }
 
  private:
-  void* library_ = nullptr;
-  int (*run_)(long, const double*, const double*) = nullptr;
+  CompiledC compiled_;
+  int (*run_)(long, const double*, const double*);
 };
 
 void steps(Form form) {

@@ -11,22 +11,19 @@
 ///
 ///     wheelwright-endurance MODEL.json LOG.csv [HOURS]      prints what it found; ends with 1 where something differs
 ///     wheelwright-endurance MODEL.json LOG.csv HOURS --emit the same rows as CSV, for `wheelwright detect --follow`
-#include <dlfcn.h>
 #include <unistd.h>
+
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <limits>
 #include <optional>
-#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,6 +36,8 @@
 #include <wheelwright/export/export_c.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/robots/online_model_file.hpp>
+
+#include "compiled_c.hpp"
 
 using namespace wheelwright;
 
@@ -121,48 +120,38 @@ struct Watched {
   }
 };
 
-/// The exported detector, compiled and loaded.
+/// The exported detector.
 class Exported {
  public:
-  Exported(const OnlineModel& model, std::size_t outputs) : outputs_(outputs) {
-    const auto folder = std::filesystem::temp_directory_path() / fmt::format("wheelwright-endurance-{}", getpid());
-    std::filesystem::create_directories(folder);
-    std::ofstream(folder / "robot.h") << exporter::c_header(make_detector(model), {.name = "robot"});
-    std::ofstream(folder / "robot.c") << "#include \"robot.h\"\n"
-                                         "static robot_state s;\n"
-                                         "void begin_robot(void) { robot_init(&s); }\n"
-                                         "int step_robot(double t, const double *sample, double *size) {\n"
-                                         "  robot_decision d; int i; robot_step(&s, t, sample, &d); *size = 0.0;\n"
-                                         "  for (i = 0; d.valid && i < ROBOT_CHANNELS; ++i) {\n"
-                                         "    const double width = d.channel[i].upper - d.channel[i].lower;\n"
-                                         "    *size += d.channel[i].residual / width;\n"
-                                         "  }\n"
-                                         "  return d.valid + 2 * d.fault;\n}\n";
-    const std::string command = fmt::format(
-        "cc -std=c99 -O2 -ffp-contract=off -shared -fPIC -o '{0}/robot.so' '{0}/robot.c' -lm", folder.string());
-    if (std::system(command.c_str()) == 0) {
-      library_ = dlopen((folder / "robot.so").c_str(), RTLD_NOW | RTLD_LOCAL);
+  explicit Exported(const OnlineModel& model)
+      : compiled_(exporter::c_header(make_detector(model), {.name = "robot"}),
+                  "#include \"robot.h\"\n"
+                  "static robot_state s;\n"
+                  "void begin_robot(void) { robot_init(&s); }\n"
+                  "int step_robot(double t, const double *sample, double *size) {\n"
+                  "  robot_decision d; int i; robot_step(&s, t, sample, &d); *size = 0.0;\n"
+                  "  for (i = 0; d.valid && i < ROBOT_CHANNELS; ++i) {\n"
+                  "    const double width = d.channel[i].upper - d.channel[i].lower;\n"
+                  "    *size += d.channel[i].residual / width;\n"
+                  "  }\n"
+                  "  return d.valid + 2 * d.fault;\n}\n"),
+        step_(compiled_.function<int(double, const double*, double*)>("step_robot")) {
+    if (auto* const begin = compiled_.function<void()>("begin_robot")) {
+      begin();
     }
-    if (library_ != nullptr) {
-      std::bit_cast<void (*)()>(dlsym(library_, "begin_robot"))();
-      take_ = std::bit_cast<int (*)(double, const double*, double*)>(dlsym(library_, "step_robot"));
-    }
-    std::error_code ignored;
-    std::filesystem::remove_all(folder, ignored);
   }
-  [[nodiscard]] bool loaded() const { return take_ != nullptr; }
+  [[nodiscard]] bool loaded() const { return step_ != nullptr; }
   [[nodiscard]] Said step(double t, const double* sample) const {
     Said said;
-    const int what = take_(t, sample, &said.size);
+    const int what = step_(t, sample, &said.size);
     said.valid = (what & 1) != 0;
     said.fault = (what & 2) != 0;
     return said;
   }
 
  private:
-  std::size_t outputs_;
-  void* library_ = nullptr;
-  int (*take_)(double, const double*, double*) = nullptr;
+  bench::CompiledC compiled_;
+  int (*step_)(double, const double*, double*);
 };
 
 /// Rows of the recording with the clock running on, and the troubles of each hour. `each` gets the time, the sample, and
@@ -224,7 +213,7 @@ class Player {
 int watch(const OnlineModel& model, Player& player, double hours) {
   TorqueDetector detector = make_detector(model);
   std::optional<detector::ScaleDetector> sums;
-  const Exported exported(model, model.model.n());
+  const Exported exported(model);
   std::vector<Watched> all;
   all.push_back({"Detector", [&](double t, const double* sample) {
                    const Decision& d = detector.step(t, {sample, player.inputs()});

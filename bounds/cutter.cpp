@@ -39,17 +39,9 @@ Cutter::Cutter(const Box& prior, const std::vector<std::vector<std::size_t>>& bl
 }
 
 void Cutter::look(Part& part) const {
-  const Box around = part.planes->outer_box();
+  part.around = part.planes->outer_box();
   part.corners = part.planes->extreme_points();
   std::tie(part.oblique_half, part.oblique_centre) = part.planes->oblique_box();
-  part.centre.clear();
-  part.half.clear();
-  part.least.clear();
-  for (const Interval& side : around.sides) {
-    part.centre.push_back(side.centre());
-    part.half.push_back(0.5 * side.width());
-    part.least.push_back(std::max({0.0, side.lower, -side.upper}));
-  }
 }
 
 bool Cutter::take(Part& part, std::size_t which, const SlabColumns& columns, std::span<const std::uint32_t> found) {
@@ -74,7 +66,7 @@ bool Cutter::take(Part& part, std::size_t which, const SlabColumns& columns, std
       double reach = -half_space->b;
       for (std::size_t k = 0; k < part.parameters.size(); ++k) {
         normal_[k] = half_space->a[static_cast<Eigen::Index>(part.parameters[k])];
-        reach += normal_[k] * part.centre[k] + std::abs(normal_[k]) * part.half[k];
+        reach += normal_[k] * part.around.centre[k] + std::abs(normal_[k]) * part.around.half[k];
       }
       if (reach > 0.0) {
         part.fresh.add({normal_.data(), part.parameters.size()}, half_space->b, half_space->origin);
@@ -101,11 +93,11 @@ std::span<const std::uint32_t> Cutter::search(const Part& part, const SlabColumn
   const kernels::Table& loops = kernels::best();
   const kernels::Oblique oblique{part.oblique_centre.data(), part.oblique_half.data(),
                                  part.planes->coordinates().transform.data()};
-  const kernels::Points points{part.centre.data(), part.half.data(), part.least.data(), part.corners.data(),
-                               static_cast<std::size_t>(part.corners.cols())};
+  const kernels::Points points{part.around.centre.data(), part.around.half.data(), part.around.least.data(),
+                               part.corners.data(), static_cast<std::size_t>(part.corners.cols())};
   const std::size_t count = corners ? loops.examine(slabs, points, found_.data(), nullptr, nullptr)
-                                    : loops.scan(slabs, part.centre.data(), part.half.data(), part.least.data(),
-                                                 &oblique, 0.0, found_.data(), nullptr);
+                                    : loops.scan(slabs, part.around.centre.data(), part.around.half.data(),
+                                                 part.around.least.data(), &oblique, 0.0, found_.data(), nullptr);
   return {found_.data(), count};
 }
 
@@ -164,12 +156,9 @@ bool Cutter::settle(Part& part, std::size_t which) {
 }
 
 bool Cutter::tighten(Part& part) {
-  part.planes->add_to_hull(part.fresh);
+  part.planes->add_to_hull(part.fresh, options_.facets ? &part.kept : nullptr);
   if (part.planes->is_empty()) {
     return false;
-  }
-  if (options_.facets) {
-    part.planes->keep_open(part.fresh, part.kept);
   }
   part.fresh.clear();
   look(part);
@@ -177,13 +166,10 @@ bool Cutter::tighten(Part& part) {
     RowBank all = std::move(part.kept);
     part.kept = {};
     part.kept.parameters = part.parameters.size();
-    part.planes->add_to_hull(all);
-    if (!part.planes->is_empty()) {
-      part.planes->keep_open(all, part.kept);
-      if (2 * part.kept.size() > options_.most) {
-        part.planes->add(part.kept);
-        part.kept.clear();
-      }
+    part.planes->add_to_hull(all, &part.kept);
+    if (!part.planes->is_empty() && 2 * part.kept.size() > options_.most) {
+      part.planes->add(part.kept);
+      part.kept.clear();
     }
     look(part);
   }

@@ -64,7 +64,7 @@ class Cutter {
     std::vector<std::size_t> parameters;
     std::optional<CuttingPlanes> planes;
     RowBank fresh, kept;
-    std::vector<double> centre, half, least;       // a box around the set held, and the smallest |θ| in it
+    CuttingPlanes::OuterBox around;                // the set held
     Eigen::VectorXd oblique_half, oblique_centre;  // a box in the coordinates of `planes`
     Eigen::MatrixXd corners;                       // where a parameter is largest or smallest
     SlabStore aside;                               // without facets: rows that the box does not imply

@@ -28,14 +28,6 @@ CuttingPlanes::CuttingPlanes(const Box& box, const Eigen::MatrixXd& information,
   recentre();
 }
 
-void CuttingPlanes::keep_open(const RowBank& from, RowBank& to) const {
-  std::vector<std::size_t> everyone(from.size());
-  std::iota(everyone.begin(), everyone.end(), std::size_t{0});
-  for (const std::size_t i : open(from, everyone)) {
-    to.add(from.normal(i), from.b[i], from.origins[i]);
-  }
-}
-
 Eigen::VectorXd CuttingPlanes::middle() const {
   return coordinates_.centre + coordinates_.transform * (0.5 * (z_upper_ + z_lower_));
 }
@@ -44,11 +36,11 @@ std::pair<Eigen::VectorXd, Eigen::VectorXd> CuttingPlanes::oblique_box() const {
   return {0.5 * (z_upper_ - z_lower_), middle()};
 }
 
-Box CuttingPlanes::outer_box() const {
+CuttingPlanes::OuterBox CuttingPlanes::outer_box() const {
   const Eigen::Index p = z_lower_.size();
   const Eigen::VectorXd half = coordinates_.transform.cwiseAbs() * (0.5 * (z_upper_ - z_lower_));
   const Eigen::VectorXd centre = middle();
-  Box around = box_;
+  OuterBox around;
   for (Eigen::Index j = 0; j < p; ++j) {
     double low = centre[j] - half[j], high = centre[j] + half[j];
     if (!corners_[static_cast<std::size_t>(2 * (p + j))].rows.empty() &&
@@ -60,9 +52,12 @@ Box CuttingPlanes::outer_box() const {
       low = std::max(low, theta(2 * (p + j) + 1));
     }
     // The prior side is exact, the other to rounding; a row more that is looked at does no harm.
-    Interval& side = around.sides[static_cast<std::size_t>(j)];
+    Interval side = box_.sides[static_cast<std::size_t>(j)];
     side.lower = std::min(std::max(side.lower, low), side.upper);
     side.upper = std::max(std::min(side.upper, high), side.lower);
+    around.centre.push_back(side.centre());
+    around.half.push_back(0.5 * side.width());
+    around.least.push_back(std::max({0.0, side.lower, -side.upper}));
   }
   return around;
 }
@@ -306,8 +301,14 @@ std::vector<std::size_t> CuttingPlanes::cut_corners(const RowBank& candidates, b
   return open(candidates, left);
 }
 
-std::vector<std::size_t> CuttingPlanes::add_to_hull(const RowBank& candidates) {
-  return is_empty() ? std::vector<std::size_t>{} : cut_corners(candidates, true);
+void CuttingPlanes::add_to_hull(const RowBank& candidates, RowBank* open) {
+  if (is_empty()) {
+    return;
+  }
+  const std::vector<std::size_t> left = cut_corners(candidates, true);
+  for (std::size_t k = 0; open != nullptr && k < left.size(); ++k) {
+    open->add(candidates.normal(left[k]), candidates.b[left[k]], candidates.origins[left[k]]);
+  }
 }
 
 bool CuttingPlanes::stands_still(std::size_t before, std::size_t round) const {

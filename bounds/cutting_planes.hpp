@@ -31,23 +31,25 @@ class CuttingPlanes {
   /// the sides of the box carry as origins.
   CuttingPlanes(const Box& box, const Eigen::MatrixXd& information, std::vector<std::size_t> parameters = {});
 
-  /// Appends to `to` those of `from` that no closed form shows to be implied: a box around the set in the whitened
-  /// coordinates.
-  void keep_open(const RowBank& from, RowBank& to) const;
   /// The 2p points θ of the rows held where a parameter is largest or smallest, one per column.
   [[nodiscard]] Eigen::MatrixXd extreme_points() const;
   /// The box of z that contains the set, to rounding: half-widths, and the θ of its middle.
   [[nodiscard]] std::pair<Eigen::VectorXd, Eigen::VectorXd> oblique_box() const;
-  /// A box of θ around the set, to rounding.
-  [[nodiscard]] Box outer_box() const;
+  /// A box of θ around the set, to rounding, as kernels::Points has it.
+  struct OuterBox {
+    std::vector<double> centre, half;
+    std::vector<double> least;  ///< the smallest |θ_j| in it
+  };
+  [[nodiscard]] OuterBox outer_box() const;
 
   /// Adds those of `candidates` that cut: first the rows most violated where one of the z or θ is largest or smallest,
   /// until none is violated there; then, one linear program each, what cuts between these vertices.
   void add(const RowBank& candidates);
   /// Adds only rows that move a vertex where one of the z or θ is largest or smallest, until `candidates` move none:
-  /// enough for the interval hull of the set of `rows` and `candidates`, though not for the set. Numbers of those that
-  /// were not added and may move a vertex yet once other rows are added.
-  std::vector<std::size_t> add_to_hull(const RowBank& candidates);
+  /// enough for the interval hull of the set of `rows` and `candidates`, though not for the set. Appends to `open`,
+  /// unless null, those that were not added and that no closed form (a box around the set in the whitened coordinates)
+  /// shows to be implied.
+  void add_to_hull(const RowBank& candidates, RowBank* open);
   /// Whether cutting has come to its end: nothing was added to the first `before` rows or, where `round` is large, only
   /// rows that are among them. (A corner whose linear program fails stays where it was and asks for the same row for
   /// ever.)

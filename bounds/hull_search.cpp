@@ -40,22 +40,10 @@ HullSearch::HullSearch(const Box& prior, const Eigen::MatrixXd& information, std
   bank_.parameters = p_;
 }
 
-/// Takes the box from the set as it is now.
-void HullSearch::look() {
-  centre_.clear();
-  half_.clear();
-  least_.clear();
-  for (const Interval& side : planes_.outer_box().sides) {
-    centre_.push_back(side.centre());
-    half_.push_back(0.5 * side.width());
-    least_.push_back(std::max({0.0, side.lower, -side.upper}));
-  }
-}
-
 /// Takes box and vertices, all of which are to be looked at.
 void HullSearch::begin() {
-  look();
-  unit_ = half_;
+  around_ = planes_.outer_box();
+  unit_ = around_.half;
   most_ = 0.0;
   corners_ = points_ = planes_.extreme_points();
 }
@@ -63,8 +51,9 @@ void HullSearch::begin() {
 /// Takes the box, and those vertices that are farther from where they were looked at than rows that are not at hand
 /// allow. False where there are none.
 bool HullSearch::look_again() {
-  look();
+  around_ = planes_.outer_box();
   const Eigen::MatrixXd now = planes_.extreme_points();
+  points_.resizeLike(now);  // an earlier look may have been at fewer
   Eigen::Index count = 0;
   for (Eigen::Index k = 0; k < now.cols(); ++k) {
     double way = 0.0;
@@ -84,9 +73,12 @@ bool HullSearch::look_again() {
 
 /// Writes those of the rows [first, first + count) that a vertex violates to `found_`.
 void HullSearch::examine(const SlabColumns& rows, std::size_t first, std::size_t count) {
-  const kernels::Points points{
-      centre_.data(), half_.data(), least_.data(), points_.data(), static_cast<std::size_t>(points_.cols()),
-      1.0 - near_};
+  const kernels::Points points{around_.centre.data(),
+                               around_.half.data(),
+                               around_.least.data(),
+                               points_.data(),
+                               static_cast<std::size_t>(points_.cols()),
+                               1.0 - near_};
   struct Share {
     std::vector<std::uint32_t> found;
     double most = 0.0;
@@ -143,7 +135,7 @@ void HullSearch::offer(const SlabColumns& rows, std::size_t row) {
     double reach = -half_space->b;
     for (std::size_t j = 0; j < p_; ++j) {
       const double a = half_space->a[static_cast<Eigen::Index>(j)];
-      reach += a * centre_[j] + std::abs(a) * half_[j];
+      reach += a * around_.centre[j] + std::abs(a) * around_.half[j];
     }
     if (reach > 0.0) {
       bank_.add({half_space->a.data(), p_}, half_space->b, half_space->origin);
@@ -158,9 +150,7 @@ bool HullSearch::add(const SlabColumns& rows) {
   }
   RowBank open;
   open.parameters = p_;
-  for (const std::size_t i : planes_.add_to_hull(bank_)) {
-    open.add(bank_.normal(i), bank_.b[i], bank_.origins[i]);
-  }
+  planes_.add_to_hull(bank_, &open);
   bank_ = std::move(open);
   return !planes_.is_empty();
 }

@@ -34,7 +34,6 @@ class HullSearch {
   [[nodiscard]] std::size_t candidates() const { return candidates_; }
 
  private:
-  void look();
   void begin();
   [[nodiscard]] bool look_again();
   void examine(const SlabColumns& rows, std::size_t first, std::size_t count);
@@ -44,14 +43,14 @@ class HullSearch {
   SlabRows rows_;
   CuttingPlanes planes_;
   std::size_t threads_, p_, candidates_ = 0;
-  std::vector<unsigned char> open_;            // for every eight rows: whether one of them may matter yet
-  std::vector<double> centre_, half_, least_;  // a box around the set, and the smallest |θ| in it
-  Eigen::MatrixXd corners_;                    // where a parameter is largest or smallest, when that was looked at
-  Eigen::MatrixXd points_;                     // those of them that are to be looked at
-  std::vector<double> unit_;                   // half-widths of the box at the first look at all rows
-  double near_;                                // rows that leave this share of their bounds are not at hand
-  double most_ = 0.0;                          // what a way of these half-widths takes of the bounds of a row at most
-  RowBank bank_;                               // half-spaces at hand
+  std::vector<unsigned char> open_;  // for every eight rows: whether one of them may matter yet
+  CuttingPlanes::OuterBox around_;   // the set as it is
+  Eigen::MatrixXd corners_;          // where a parameter is largest or smallest, when that was looked at
+  Eigen::MatrixXd points_;           // those of them that are to be looked at
+  std::vector<double> unit_;         // half-widths of the box at the first look at all rows
+  double near_;                      // rows that leave this share of their bounds are not at hand
+  double most_ = 0.0;                // what a way of these half-widths takes of the bounds of a row at most
+  RowBank bank_;                     // half-spaces at hand
   std::vector<std::uint32_t> found_;
   std::vector<double> Y_, dY_;
   HalfSpace upper_, lower_;

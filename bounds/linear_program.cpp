@@ -95,18 +95,15 @@ void LinearProgram::add_rows(const Eigen::MatrixXd& a_columns, const Eigen::Vect
     }
     b_[count_ + k] = b[static_cast<Eigen::Index>(k)];
   }
+  count_ += added;
   for (std::size_t k = 0; k < seen_.size(); ++k) {
-    for (std::size_t i = count_; i < count_ + added && !seen_[k].rows.empty(); ++i) {
-      double excess = -b_[i];
-      for (std::size_t j = 0; j < p_; ++j) {
-        excess += a_[j * stride_ + i] * seen_x_[j * kSeen + k];
-      }
-      if (excess > kFeasible) {
-        seen_[k].rows.clear();
-      }
+    for (std::size_t j = 0; j < p_; ++j) {
+      row_[j] = seen_x_[j * kSeen + k];
+    }
+    if (violation(count_ - added, row_.data()) > kFeasible) {
+      seen_[k].rows.clear();
     }
   }
-  count_ += added;
   settled_ = false;
 }
 
