@@ -141,6 +141,32 @@ void steps(Form form) {
   }
 }
 
+/// Many robots in one process, each with a detector of its own, a sample of each in turn.
+void robots(Form form) {
+  const World w(false);
+  const TorqueDetector one = w.detector({.set = ParameterSetKind::box});
+  for (const std::size_t count : {1, 100, 10000}) {
+    std::vector<TorqueDetector> fleet(count, one);
+    TorqueDetector alone = one;
+    const std::size_t turns = World::rows / count;
+    compare(
+        form,
+        {fmt::format("detector/robots {} of them", count), World::rows, 4, 1, "one robot, as many steps",
+         [&](double seconds) { return each(seconds, World::rows); }},
+        [&] {
+          for (TorqueDetector& detector : fleet) {
+            detector.restart();
+          }
+          for (std::size_t k = 0; k < turns; ++k) {
+            for (TorqueDetector& detector : fleet) {
+              DoNotOptimize(detector.step(w.t[k], {w.samples.data() + k * w.inputs, w.inputs}).fault);
+            }
+          }
+        },
+        [&] { w.run(alone); }, kRepetitions);
+  }
+}
+
 /// Thresholds of both channels of slowly turning rows, next to constant ones.
 void thresholds(Form form) {
   const std::size_t n = 100000;
@@ -210,7 +236,8 @@ void supports(Form form) {
   }
 }
 
-const bool registered = register_bench("detector/step", steps) && register_bench("detector/threshold", thresholds) &&
+const bool registered = register_bench("detector/step", steps) && register_bench("detector/robots", robots) &&
+                        register_bench("detector/threshold", thresholds) &&
                         register_bench("detector/support", supports);
 
 }  // namespace

@@ -33,13 +33,16 @@ struct Box {
       sum += term;
       magnitude += std::abs(term);
     }
+    return magnitude == 0.0 && is_zero(a) ? 0.0 : outward(sum, magnitude, sides.size());
+  }
+
+  /// `sum` of p products whose sizes add up to `magnitude`, rounded as support() promises.
+  [[nodiscard]] static double outward(double sum, double magnitude, std::size_t p) noexcept {
     // Rounding of p products and p sums is at most (p + 1)·2⁻⁵³·Σ|term| plus an underflow each (Higham 2002, section
     // 3.1); eight times that covers the rounding of the bound itself.
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
-    const double p = static_cast<double>(sides.size());
-    return magnitude == 0.0 && is_zero(a)
-               ? 0.0
-               : sum + (4.0 * (p + 1.0) * epsilon * magnitude + 2.0 * p * std::numeric_limits<double>::min());
+    const double n = static_cast<double>(p);
+    return sum + (4.0 * (n + 1.0) * epsilon * magnitude + 2.0 * n * std::numeric_limits<double>::min());
   }
 
   /// The same, and writes a corner where the maximum is attained to `maximiser` (p entries).

@@ -39,73 +39,108 @@ std::optional<SupportTable> SupportTable::make(const Polytope& set, const Suppor
   return table;
 }
 
-double SupportTable::support(std::span<const double> a, std::size_t slot) noexcept {
+namespace {
+
+// What blocks have added to h so far.
+struct Sum {
   double value = 0.0, magnitude = 0.0, slack = 0.0;
+  std::size_t edges = 0;
+};
+
+// From the vertex at `place` along edges to the best one for `direction`, at most `budget` of them. Q is the block's number
+// of parameters, or 0 where that is known to `graph` alone; `mu` has room for it.
+template <std::size_t Q>
+void follow(const VertexGraph& graph, const double* direction, std::uint32_t& place, std::size_t budget, double* a,
+            double* mu, Sum& h) {
+  const std::size_t q = Q > 0 ? Q : graph.parameters.size(), stride = q * q + 4 * q;
+  double size = 0.0, sum = 0.0, product = 0.0;
+  for (std::size_t k = 0; k < q; ++k) {
+    a[k] = direction[graph.parameters[k]];
+    sum += std::abs(a[k]);
+    size += std::abs(a[k]) * graph.half[k];
+  }
+  if (sum == 0.0) {
+    return;
+  }
+  const double* multiply = nullptr;
+  for (std::size_t left = budget;; --left) {
+    multiply = graph.numbers.data() + place * stride;
+    const double* penalty = multiply + q * q + 2 * q;
+    const double* weight = penalty + q;
+    double cost = 0.0, steepest = 0.0;
+    std::size_t leaving = 0;
+    for (std::size_t r = 0; r < q; ++r) {
+      mu[r] = multiply[r] * a[0];
+    }
+    for (std::size_t k = 1; k < q; ++k) {
+      for (std::size_t r = 0; r < q; ++r) {
+        mu[r] += multiply[k * q + r] * a[k];
+      }
+    }
+    for (std::size_t r = 0; r < q; ++r) {
+      if (mu[r] < 0.0) {
+        cost -= mu[r] * penalty[r];
+        if (mu[r] * weight[r] < steepest) {
+          steepest = mu[r] * weight[r];
+          leaving = r;
+        }
+      }
+    }
+    if (cost <= SupportTable::kTight * size || left == 0) {
+      h.slack += cost;
+      break;
+    }
+    place = graph.neighbours[place * q + leaving];
+    ++h.edges;
+  }
+  const double* point = multiply + q * q;
+  const double* doubt = point + q;
+  for (std::size_t k = 0; k < q; ++k) {
+    product += a[k] * point[k];
+    h.slack += std::abs(a[k]) * doubt[k];
+  }
+  h.value += product;
+  h.magnitude += std::abs(product);
+}
+
+// With room of its own, in registers.
+template <std::size_t Q>
+void follow(const VertexGraph& graph, const double* direction, std::uint32_t& place, std::size_t budget, Sum& h) {
+  double a[Q], mu[Q];
+  follow<Q>(graph, direction, place, budget, a, mu, h);
+}
+
+}  // namespace
+
+double SupportTable::support(std::span<const double> a, std::size_t slot) noexcept {
+  Sum h;
   for (const std::size_t j : singles_) {
     const Interval& side = set_.hull().sides[j];
     const double product = a[j] * (a[j] > 0.0 ? side.upper : side.lower);
-    value += product;
-    magnitude += std::abs(product);
+    h.value += product;
+    h.magnitude += std::abs(product);
   }
   for (std::size_t g = 0; g < graphs_.size(); ++g) {
-    const VertexGraph& graph = graphs_[g];
-    const std::size_t q = graph.parameters.size(), stride = q * q + 4 * q;
-    double size = 0.0, sum = 0.0;
-    for (std::size_t k = 0; k < q; ++k) {
-      a_[k] = a[graph.parameters[k]];
-      sum += std::abs(a_[k]);
-      size += std::abs(a_[k]) * graph.half[k];
-    }
-    if (sum == 0.0) {
-      continue;
-    }
     std::uint32_t& place = places_[g * options_.slots + slot];
-    for (std::size_t left = options_.budget;; --left) {
-      const double* multiply = graph.numbers.data() + place * stride;
-      const double* penalty = multiply + q * q + 2 * q;
-      const double* weight = penalty + q;
-      double cost = 0.0, steepest = 0.0;
-      std::size_t leaving = 0;
-      for (std::size_t r = 0; r < q; ++r) {
-        mu_[r] = multiply[r] * a_[0];
-      }
-      for (std::size_t k = 1; k < q; ++k) {
-        for (std::size_t r = 0; r < q; ++r) {
-          mu_[r] += multiply[k * q + r] * a_[k];
-        }
-      }
-      for (std::size_t r = 0; r < q; ++r) {
-        if (mu_[r] < 0.0) {
-          cost -= mu_[r] * penalty[r];
-          if (mu_[r] * weight[r] < steepest) {
-            steepest = mu_[r] * weight[r];
-            leaving = r;
-          }
-        }
-      }
-      if (cost <= kTight * size || left == 0) {
-        slack += cost;
-        break;
-      }
-      place = graph.neighbours[place * q + leaving];
-      ++edges_;
+    const VertexGraph& graph = graphs_[g];
+    switch (graph.parameters.size()) {
+      case 2: follow<2>(graph, a.data(), place, options_.budget, h); break;
+      case 3: follow<3>(graph, a.data(), place, options_.budget, h); break;
+      case 4: follow<4>(graph, a.data(), place, options_.budget, h); break;
+      case 5: follow<5>(graph, a.data(), place, options_.budget, h); break;
+      case 6: follow<6>(graph, a.data(), place, options_.budget, h); break;
+      case 7: follow<7>(graph, a.data(), place, options_.budget, h); break;
+      case 8: follow<8>(graph, a.data(), place, options_.budget, h); break;
+      default: follow<0>(graph, a.data(), place, options_.budget, a_.data(), mu_.data(), h);
     }
-    const double* point = graph.numbers.data() + place * stride + q * q;
-    const double* doubt = point + q;
-    double product = 0.0;
-    for (std::size_t k = 0; k < q; ++k) {
-      product += a_[k] * point[k];
-      slack += std::abs(a_[k]) * doubt[k];
-    }
-    value += product;
-    magnitude += std::abs(product);
   }
+  edges_ += h.edges;
   // ε covers the rounding of μ and of a·v. What is left: sums of at most p numbers >= 0 (slack), and of at most p
   // products of either sign with the last addition (Higham 2002, section 3.1); twice of each covers the bound's own
   // rounding.
   const double p = static_cast<double>(a.size());
-  const double bound =
-      value + (slack * (1.0 + (p + 6.0) * core::kEpsilon) + ((p + 2.0) * core::kEpsilon * magnitude + core::kTiny));
+  const double bound = h.value + (h.slack * (1.0 + (p + 6.0) * core::kEpsilon) +
+                                  ((p + 2.0) * core::kEpsilon * h.magnitude + core::kTiny));
   return std::min(bound, set_.hull().support(a));
 }
 

@@ -441,7 +441,7 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
       filtered_(FaultSignals::none(model)) {
   filter::validate(design);
   kernel_ = filter::FilterKernel(design, motion.kind, motion.nominal_step);
-  cascades_.resize(model.n() * (3 * model.p() + 1));
+  cascades_ = filter::KernelBank(model.n() * (3 * model.p() + 1));
   const auto n = static_cast<Eigen::Index>(model.n());
   from_motion_ = inverse_of(model);
   to_joints_ = core::pseudo_inverse(model.input);
@@ -476,23 +476,39 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
     read_errors_.emplace(fault_, model, design, motion);
   }
   last_ = FaultSignals::none(model);
-  widened_.resize(model.n() * (model.p() + 1));
+  widened_ = filter::KernelBank(model.n() * (model.p() + 1));
   range_ = last_.g1;
   widened_c_ = last_.c;
 }
+
+namespace {
+
+// `signals` from numbers that stand one after the other.
+void fill(FaultSignals& signals, const double* from) {
+  const auto take = [&](auto& to) {
+    std::copy_n(from, to.size(), to.data());
+    from += to.size();
+  };
+  take(signals.g1);
+  take(signals.g2);
+  take(signals.s);
+  take(signals.c);
+}
+
+}  // namespace
 
 void FaultFilter::begin(std::size_t onset) {
   begin_filter(onset);
   elements_.begin(onset);
   const FaultSignals& jumps = elements_.jump();
   const std::size_t size = static_cast<std::size_t>(jumps.g1.size());
+  const auto jump = [&](std::size_t e, double by) {
+    cascades_.z1()[e] += by;
+    cascades_.fast()[e] += by;
+  };
   for (std::size_t e = 0; e < size; ++e) {
-    const auto jump = [](filter::KernelState& state, double by) {
-      state.z1 += by;
-      state.fast += by;
-    };
-    jump(cascades_[e], jumps.g1.data()[e]);
-    jump(cascades_[2 * size + e], jumps.s.data()[e]);
+    jump(e, jumps.g1.data()[e]);
+    jump(2 * size + e, jumps.s.data()[e]);
   }
 }
 
@@ -502,9 +518,9 @@ void FaultFilter::begin_filter(std::size_t onset) {
   if (read_errors_) {
     read_errors_->begin(onset);
   }
-  std::fill(cascades_.begin(), cascades_.end(), filter::KernelState{});
+  cascades_.clear();
   filtered_ = last_ = FaultSignals::none(*model_);
-  std::fill(widened_.begin(), widened_.end(), filter::KernelState{});
+  widened_.clear();
   range_.setZero();
   widened_c_.setZero();
   added_ = since_ = 0.0;
@@ -519,17 +535,22 @@ void FaultFilter::begin_broken(std::size_t first) {
 void FaultFilter::filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares,
                          double h) {
   kernel_.prepare(h);
-  std::size_t at = 0;
-  const auto advance = [&](const auto& from, const auto& to, auto& out) {
-    for (Eigen::Index e = 0; e < from.size(); ++e, ++at) {
-      kernel_.take(cascades_[at], shares[0] * from.data()[e] + shares[1] * to.data()[e]);
-      out.data()[e] = kernel_.value(cascades_[at]);
+  double* in = cascades_.in();
+  const auto put = [&](const auto& from, const auto& to) {
+    for (Eigen::Index e = 0; e < from.size(); ++e) {
+      *in++ = shares[0] * from.data()[e] + shares[1] * to.data()[e];
     }
   };
-  advance(begin.g1, end.g1, filtered_.g1);
-  advance(begin.g2, end.g2, filtered_.g2);
-  advance(begin.s, end.s, filtered_.s);
-  advance(begin.c, end.c, filtered_.c);
+  put(begin.g1, end.g1);
+  put(begin.g2, end.g2);
+  put(begin.s, end.s);
+  put(begin.c, end.c);
+  if ((k_ - onset_) % filter::kFade == 0) {
+    cascades_.fade();
+    widened_.fade();
+  }
+  kernel_.take(cascades_);
+  fill(filtered_, cascades_.out());
 }
 
 // Half of what the efforts that the fault adds change by, in every step in which a sample counts, as if from the first.
@@ -551,22 +572,20 @@ void FaultFilter::widen(const FaultSignals& begin, const FaultSignals& end, bool
       change([](const FaultSignals& s) { return s.g1; }) + change([](const FaultSignals& s) { return s.g2; });
   const Eigen::MatrixXd c = change([](const FaultSignals& s) { return s.c; });
   std::size_t at = 0;
-  const auto advance = [&](double by) {
-    filter::KernelState& state = widened_[at++];
-    state.z1 += by;
-    state.z2 += steps * h * by;
-    state.fast += by;
-    kernel_.take(state, 0.0);
-    return kernel_.value(state);
-  };
-  for (Eigen::Index i = 0; i < g.rows(); ++i) {
-    for (Eigen::Index j = 0; j < g.cols(); ++j) {
-      range_(i, j) = advance(g(i, j));
+  const auto add = [&](const Eigen::MatrixXd& by) {
+    for (Eigen::Index i = 0; i < by.rows(); ++i) {
+      for (Eigen::Index j = 0; j < by.cols(); ++j, ++at) {
+        widened_.z1()[at] += by(i, j);
+        widened_.z2()[at] += steps * h * by(i, j);
+        widened_.fast()[at] += by(i, j);
+      }
     }
-  }
-  for (Eigen::Index i = 0; i < c.rows(); ++i) {
-    widened_c_[i] = advance(c(i, 0));
-  }
+  };
+  add(g);
+  add(c);
+  kernel_.take(widened_);
+  std::copy_n(widened_.out(), range_.size(), range_.data());
+  std::copy_n(widened_.out() + range_.size(), widened_c_.size(), widened_c_.data());
   last_ = end;
 }
 
@@ -579,18 +598,9 @@ double FaultFilter::most_added(const FaultSignals& signals) const {
   return sum.maxCoeff();
 }
 
-FaultSignals FaultFilter::state(double filter::KernelState::*part) const {
+FaultSignals FaultFilter::state(const double* (filter::KernelBank::*part)() const) const {
   FaultSignals out = FaultSignals::none(*model_);
-  std::size_t at = 0;
-  const auto fill = [&](auto& to) {
-    for (Eigen::Index e = 0; e < to.size(); ++e, ++at) {
-      to.data()[e] = cascades_[at].*part;
-    }
-  };
-  fill(out.g1);
-  fill(out.g2);
-  fill(out.s);
-  fill(out.c);
+  fill(out, (cascades_.*part)());
   return out;
 }
 

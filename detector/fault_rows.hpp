@@ -204,8 +204,8 @@ class FaultFilter final : public FaultRows {
   bool next() override;
   [[nodiscard]] std::size_t instant() const override { return k_; }
   [[nodiscard]] FaultRow row(std::size_t i) const override;
-  /// What one signal of the filter remembers, entry by entry: `part` of its state.
-  [[nodiscard]] FaultSignals state(double filter::KernelState::*part) const;
+  /// What the filter remembers of each signal: `part` of a KernelState, from a bank of them.
+  [[nodiscard]] FaultSignals state(const double* (filter::KernelBank::*part)() const) const;
 
  private:
   void begin_filter(std::size_t onset);
@@ -218,7 +218,7 @@ class FaultFilter final : public FaultRows {
   const ReferenceMotion* motion_;
   FaultElements elements_;
   filter::FilterKernel kernel_;
-  std::vector<filter::KernelState> cascades_;  // g1, g2, s, c one after the other
+  filter::KernelBank cascades_;  // g1, g2, s, c one after the other
   FaultSignals filtered_;
   bool gain_only_ = false;       // a fault of an effort's gain, and nothing else
   Eigen::VectorXd gain_;         // per output: by how much it widens what is in doubt of efforts
@@ -228,8 +228,8 @@ class FaultFilter final : public FaultRows {
   bool proportional_ = false;    // its efforts are multiples of the healthy ones
   double growth_ = 0.0;          // by how many of them, per unit of κ
   double most_kappa_ = 0.0;
-  double added_ = 0.0;                        // largest effort per unit of κ since the onset
-  std::vector<filter::KernelState> widened_;  // n × p of range_, then n of c
+  double added_ = 0.0;          // largest effort per unit of κ since the onset
+  filter::KernelBank widened_;  // n × p of range_, then n of c
   core::RowMatrix range_;
   Eigen::VectorXd widened_c_;
   std::optional<SignatureErrors> read_errors_;  // of a measured motion

@@ -86,8 +86,8 @@ void OnsetRows::take(const FaultType& fault) {
   FaultFilter filter(fault, *model_, design_, *motion_);
   filter.begin(first_);
   while (filter.instant() + 1 < end_ && filter.next()) {
-    state_[filter.instant() - first_] = {filter.state(&filter::KernelState::z1), filter.state(&filter::KernelState::z2),
-                                         filter.state(&filter::KernelState::fast)};
+    state_[filter.instant() - first_] = {filter.state(&filter::KernelBank::z1), filter.state(&filter::KernelBank::z2),
+                                         filter.state(&filter::KernelBank::fast)};
   }
 }
 

@@ -10,6 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/detector/sum_kernel.hpp>
+#include <wheelwright/filter/kernel.hpp>
 
 namespace wheelwright::detector {
 namespace {
@@ -372,6 +373,29 @@ void PoseSumDetector::take(const Step& step) {
         sum.l0 += n * std::abs(x * d * f.wheel1[k]);
         sum.l1 += n * std::abs(d * f.wheel1[k] - f.wheel[k]);
       }
+    }
+  }
+  if (step.number % filter::kFade == 0) {
+    fade();
+  }
+}
+
+void PoseSumDetector::fade() {
+  const auto fade = [](auto& numbers) {
+    for (double& x : numbers) {
+      x = filter::faded(x);
+    }
+  };
+  std::ranges::for_each(z_, fade);
+  for (Scale& s : states_) {
+    s.Y0 = s.Y0.unaryExpr(&filter::faded);
+    s.Y1 = s.Y1.unaryExpr(&filter::faded);
+    for (Sum& sum : s.sums) {
+      for (double* x : {&sum.y0, &sum.y1, &sum.r0, &sum.r1, &sum.l0, &sum.l1}) {
+        *x = filter::faded(*x);
+      }
+      fade(sum.position);
+      fade(sum.heading);
     }
   }
 }

@@ -157,6 +157,7 @@ class PoseSumDetector {
   void release(const Waiting& step);
   void weigh(const Step& step);
   void take(const Step& step);
+  void fade();
   void look(Scale& scale, std::size_t which);
   [[nodiscard]] double averaged(double V, double usual, double L, const filter::SampleClass& sample) const;
   [[nodiscard]] Eigen::MatrixXd variances(std::array<double, 3> Sum::*part) const;

@@ -9,6 +9,7 @@
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
 #include <wheelwright/detector/sum_kernel.hpp>
+#include <wheelwright/filter/kernel.hpp>
 
 namespace wheelwright::detector {
 namespace {
@@ -329,7 +330,18 @@ void ScaleDetector::take() {
     s.since += h;
   }
   efforts1_ = efforts_;
-  ++taken_;
+  if (++taken_ % filter::kFade == 0) {
+    fade();
+  }
+}
+
+void ScaleDetector::fade() {
+  const auto fade = [](auto&... all) { ((all = all.unaryExpr(&filter::faded)), ...); };
+  foreseen_.fade();
+  fade(g_, g1_, c_, c1_, c2_, efforts1_);
+  for (Scale& s : states_) {
+    fade(s.linear0, s.linear1, s.v0, s.v1, s.v2, s.u0, s.u1, s.u2);
+  }
 }
 
 void ScaleDetector::look(Scale& s, std::size_t which) {

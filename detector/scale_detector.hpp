@@ -133,6 +133,7 @@ class ScaleDetector {
   void begin();
   void weigh();
   void take();
+  void fade();
   void look(Scale& scale, std::size_t which);
 
   filter::ElementFilter elements_;

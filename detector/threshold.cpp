@@ -25,7 +25,8 @@ ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSe
                            std::max(std::abs(side.lower), std::abs(side.upper)),
                            side.lower >= 0.0   ? 1.0
                            : side.upper <= 0.0 ? -1.0
-                                               : 0.0});
+                                               : 0.0,
+                           side});
   }
   if (kind_ == ParameterSetKind::polytope) {
     table_ = bounds::SupportTable::make(set_, {.slots = kSlots});
@@ -35,15 +36,14 @@ ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSe
   }
 }
 
+template <typename Take>
 ThresholdRule::Beside ThresholdRule::beside(std::span<const double> y, std::span<const double> dy_regressor,
-                                            double dy_output) const noexcept {
-  const std::size_t p = direction_.size();
+                                            double dy_output, Take&& take) const noexcept {
+  const std::size_t p = parameters_.size();
   double extra = dy_output;
   double predicted = 0.0;
   double magnitude = dy_output;
   double reach = 0.0;
-  double* const up = direction_.data();
-  double* const down = opposite_.data();
   for (std::size_t j = 0; j < p; ++j) {
     const Parameter& theta = parameters_[j];
     const double error = dy_regressor[j];
@@ -55,8 +55,7 @@ ThresholdRule::Beside ThresholdRule::beside(std::span<const double> y, std::span
       extra += error * theta.largest;
     }
     const double shift = theta.sign * error;
-    up[j] = y[j] + shift;
-    down[j] = -y[j] + shift;
+    take(j, y[j] + shift, -y[j] + shift);
   }
   // Sums of p + 3 terms, and as many in the residual that is compared with the result: Higham 2002, section 3.1. The
   // rounding of the direction itself is covered by the terms Δ|θ|. |h(±y + Δ)| <= Σ (|y_j| + Δ_j) max|θ_j|: measured
@@ -66,8 +65,44 @@ ThresholdRule::Beside ThresholdRule::beside(std::span<const double> y, std::span
   return {predicted, extra, rounding};
 }
 
+ThresholdRule::Beside ThresholdRule::beside(std::span<const double> y, std::span<const double> dy_regressor,
+                                            double dy_output) const noexcept {
+  double *const up = direction_.data(), *const down = opposite_.data();
+  return beside(y, dy_regressor, dy_output, [&](std::size_t j, double above, double below) {
+    up[j] = above;
+    down[j] = below;
+  });
+}
+
+// support() of the hull for both directions, as they come.
+Threshold ThresholdRule::of_hull(std::span<const double> y, std::span<const double> dy_regressor,
+                                 double dy_output) const noexcept {
+  struct Support {
+    double sum = 0.0, magnitude = 0.0;
+    bool zero = true;
+    void take(double a, const Interval& side) {
+      const double term = std::max(a * side.lower, a * side.upper);
+      sum += term;
+      magnitude += std::abs(term);
+      zero = zero && a == 0.0;
+    }
+    [[nodiscard]] double value(std::size_t p) const {
+      return magnitude == 0.0 && zero ? 0.0 : Box::outward(sum, magnitude, p);
+    }
+  } up, down;
+  const Beside by = beside(y, dy_regressor, dy_output, [&](std::size_t j, double above, double below) {
+    up.take(above, parameters_[j].side);
+    down.take(below, parameters_[j].side);
+  });
+  const std::size_t p = parameters_.size();
+  return {-down.value(p) - by.predicted - by.extra - by.rounding, up.value(p) - by.predicted + by.extra + by.rounding};
+}
+
 Threshold ThresholdRule::at(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
                             std::size_t channel) const noexcept {
+  if (kind_ == ParameterSetKind::box) {
+    return of_hull(y, dy_regressor, dy_output);
+  }
   const Beside by = beside(y, dy_regressor, dy_output);
   const double above = support(direction_, 2 * channel);
   const double below = support(opposite_, 2 * channel + 1);

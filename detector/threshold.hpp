@@ -83,9 +83,15 @@ class ThresholdRule {
   struct Beside {
     double predicted, extra, rounding;
   };
+  // Calls take(j, y_j + Δ_j, −y_j + Δ_j).
+  template <typename Take>
+  [[nodiscard]] Beside beside(std::span<const double> y, std::span<const double> dy_regressor, double dy_output,
+                              Take&& take) const noexcept;
   // Fills direction_ for h(y + Δ) and opposite_ for h(−y + Δ).
   [[nodiscard]] Beside beside(std::span<const double> y, std::span<const double> dy_regressor,
                               double dy_output) const noexcept;
+  [[nodiscard]] Threshold of_hull(std::span<const double> y, std::span<const double> dy_regressor,
+                                  double dy_output) const noexcept;
 
   Polytope set_;
   Eigen::VectorXd estimate_;
@@ -94,6 +100,7 @@ class ThresholdRule {
     double estimate = 0.0;  // θ̂_j
     double largest = 0.0;   // max |θ_j|
     double sign = 0.0;      // of θ_j, 0 where it is open
+    Interval side;
   };
   std::vector<Parameter> parameters_;
   mutable std::vector<double> direction_, opposite_;

@@ -224,6 +224,9 @@ std::string FilterWriter::types() const {
           : measurement_.nominal_step > 0.0 ? kSmoothKernel
                                             : kNodeKernel);
   out.put("\n");
+  out.put(kFade);
+  out.line("    if (fabs(x) < {}) {{", hex(filter::kTrace));
+  out.put(kFaded);
   if (interpolated_ && nodes_) {
     out.put(kMajorant);
     out.put("\n");
@@ -301,6 +304,7 @@ std::string FilterWriter::state() const {
   out.line("  pfx_elements elements;");
   out.line("  pfx_weights weights;");
   out.line("  pfx_memory memory;");
+  out.line("  int fading; /* elements since pfx_fade */");
   return out.take();
 }
 
@@ -889,6 +893,10 @@ void FilterWriter::advance(Text& out) const {
   out.line("  const pfx_weights *w = &s->weights;");
   out.line("  pfx_memory *m = &s->memory;");
   out.line("  int i;");
+  out.line("  s->fading = (s->fading + 1) % {};", filter::kFade);
+  out.line("  if (s->fading == 0) {{");
+  out.line("    pfx_fade(m, sizeof *m);");
+  out.line("  }}");
   out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
   out.line_if(viscous_, "    pfx_take(&m->motion[i], w, e->motion[i]);");
   out.line_if(inertial_, "    pfx_take(&m->slope[i], w, e->slope[i]);");
@@ -989,6 +997,7 @@ void FilterWriter::filter(Text& out) const {
   out.line("  if (all->began) {{");
   out.line_if(first_doubt, "    int i;");
   out.line("    memset(&s->memory, 0, sizeof s->memory);");
+  out.line("    s->fading = 0;");
   out.line_if(start_, "    s->memory.first_length = p->length;");
   if (first_doubt) {
     out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");

@@ -50,6 +50,7 @@ static inline void pfx_sums_begin(pfx_sums *s)
     s->scale[k].since = s->scale[k].samples = 0.0;
     memset(&s->scale[k].sum, 0, sizeof s->scale[k].sum);
   }
+  s->fading = 0;
 }
 )";
 
@@ -283,6 +284,7 @@ typedef struct pfx_sums {
   double c[PFX_CHANNELS][PFX_SUMS], c1[PFX_CHANNELS][PFX_SUMS], c2[PFX_CHANNELS][PFX_SUMS]; /* and of slopes */
   double efforts1[PFX_SUMS];                /* squares of the weights of efforts, of the element before */
   double steps[4];                          /* the newest last, s */
+  int fading;                               /* elements since pfx_fade */
   pfx_scale scale[PFX_SCALES];
 )";
   constexpr std::string_view kVaried = "VARIED";
@@ -664,6 +666,19 @@ static inline int pfx_sums_step(pfx_sums *s, double t, const double sample[PFX_I
   text += R"(  pfx_foresee(s, &element);
   pfx_weigh(s, &element);
   pfx_sums_take(s, &element);
+  s->fading = (s->fading + 1) % FADE;
+  if (s->fading == 0) {
+    pfx_fade(s->stage, sizeof s->stage);
+    pfx_fade(s->g, sizeof s->g);
+    pfx_fade(s->g1, sizeof s->g1);
+    pfx_fade(s->c, sizeof s->c);
+    pfx_fade(s->c1, sizeof s->c1);
+    pfx_fade(s->c2, sizeof s->c2);
+    pfx_fade(s->efforts1, sizeof s->efforts1);
+    for (k = 0; k < PFX_SCALES; ++k) {
+      pfx_fade(&s->scale[k].sum, sizeof s->scale[k].sum);
+    }
+  }
   for (k = 0; k < PFX_SCALES; ++k) {
     if (s->scale[k].since * PFX_CHECKS >= pfx_scale_time[k]) {
       s->scale[k].since = 0.0;
@@ -673,6 +688,8 @@ static inline int pfx_sums_step(pfx_sums *s, double t, const double sample[PFX_I
   return s->looks > 0;
 }
 )";
+  constexpr std::string_view kEvery = "FADE";
+  text.replace(text.find(kEvery), kEvery.size(), fmt::format("{}", filter::kFade));
   return text;
 }
 

@@ -247,6 +247,23 @@ static inline double pfx_value(const pfx_cascade *c)
 }
 )";
 
+const std::string_view kFade =
+    R"(/* Numbers that only fade end as denormal ones, for ever, which take a processor many times as long: of `size` bytes of
+ * doubles, what is far below all rounding is taken for 0. */
+static inline void pfx_fade(void *doubles, size_t size)
+{
+  char *at = (char *)doubles, *const end = at + size;
+  double x;
+  for (; at != end; at += sizeof x) {
+    memcpy(&x, at, sizeof x);
+)";
+const std::string_view kFaded = R"(      x = 0.0;
+      memcpy(at, &x, sizeof x);
+    }
+  }
+}
+)";
+
 const std::string_view kMajorant =
     "/* Sum of impulses with the weight (1 - x + x^2 / 2) exp(-x), x beta times their age: bounds what "
     R"(the slope of the kernel

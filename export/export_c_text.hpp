@@ -53,6 +53,9 @@ extern const std::string_view kNodeKernel;
 /// exponential_moments() (filter/kernel.hpp) as far as speeds need it, and FilterKernel for them: order 1 and 2.
 extern const std::string_view kFirstOrderKernel;
 extern const std::string_view kSpeedKernel;
+/// faded() (filter/kernel.hpp) of all numbers of a piece of memory, around the comparison with kTrace.
+extern const std::string_view kFade;
+extern const std::string_view kFaded;
 /// SlopeMajorant (filter/kernel.hpp).
 extern const std::string_view kMajorant;
 /// Box::support, of the hull.

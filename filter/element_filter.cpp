@@ -15,26 +15,45 @@ constexpr double kAlike = 0.05;  // relative: steps alike enough for a parabola 
 
 double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double>(x < 0.0); }
 
-// result = matrix · x, each sum from the first column to the last: the same digits in every language and build.
-void multiply(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    double sum = matrix(i, 0) * x[0];
-    for (Eigen::Index j = 1; j < matrix.cols(); ++j) {
-      sum += matrix(i, j) * x[j];
-    }
-    result[i] = sum;
+// act(0), ..., act(n - 1); without a loop where n is 2, as for robots on two wheels.
+template <typename Act>
+void each(Eigen::Index n, Act&& act) {
+  if (n == 2) {
+    act(0);
+    act(1);
+    return;
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    act(i);
   }
 }
 
-// The same with |matrix|.
-void multiply_sizes(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    double sum = std::abs(matrix(i, 0)) * x[0];
-    for (Eigen::Index j = 1; j < matrix.cols(); ++j) {
-      sum += std::abs(matrix(i, j)) * x[j];
+// to = matrix · from, with `part` of the matrix's numbers; each sum from the first column to the last: the same digits in
+// every language and build.
+template <typename Part>
+void multiply(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& from, Eigen::VectorXd& to, Part&& part) {
+  const Eigen::Index rows = matrix.rows(), columns = matrix.cols();
+  const double* const m = matrix.data();
+  each(rows, [&](Eigen::Index i) {
+    double sum = part(m[i]) * from[0];
+    if (columns == 2) {
+      sum += part(m[i + rows]) * from[1];
+    } else {
+      for (Eigen::Index j = 1; j < columns; ++j) {
+        sum += part(m[i + j * rows]) * from[j];
+      }
     }
-    result[i] = sum;
-  }
+    to[i] = sum;
+  });
+}
+
+void multiply(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& from, Eigen::VectorXd& to) {
+  multiply(matrix, from, to, [](double x) { return x; });
+}
+
+// The same with |matrix|.
+void multiply_sizes(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& from, Eigen::VectorXd& to) {
+  multiply(matrix, from, to, [](double x) { return std::abs(x); });
 }
 
 double cube(double x) { return x * x * x; }
@@ -81,9 +100,9 @@ ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors 
   const Eigen::VectorXd joint_zero = Eigen::VectorXd::Zero(joints), output_zero = Eigen::VectorXd::Zero(n);
   ring_.assign(ahead_ + back, Sample{0.0, joint_zero, joint_zero, joint_zero, 0.0});
   speed_ = speed_before_ = Eigen::VectorXd::Zero(coordinates);
-  joint_speed_ = low_ = high_ = scratch_ = joint_zero;
-  step_ = step_before_ = StepMotion(model_);
-  effort_ = effort_before_ = {output_zero, output_zero, output_zero};
+  joint_speed_ = low_ = high_ = scratch_ = falling_in_ = rising_in_ = joint_zero;
+  steps_.fill(StepMotion(model_));
+  efforts_.fill(StepEffort{output_zero, output_zero, output_zero});
   curve_ = curve_doubt_ = effort_change_ = output_zero;
   for (std::size_t k = 0; k < model_.terms.size(); ++k) {
     if (model_.terms[k].kind == Term::Kind::function) {
@@ -147,26 +166,21 @@ void ElementFilter::read_effort(Sample& now, std::span<const double> sample) {
 }
 
 void ElementFilter::measure_motion(const Sample& now, const Sample& before) {
-  StepMotion& step = step_;
+  StepMotion& step = present();
   switch (measurement_.motion) {
     case MotionKind::angle:
-      for (Eigen::Index j = 0; j < now.joint.size(); ++j) {
-        step.joint_speed[j] = (now.joint[j] - before.joint[j]) / step.length;
-      }
+      each(now.joint.size(),
+           [&](Eigen::Index j) { step.joint_speed[j] = (now.joint[j] - before.joint[j]) / step.length; });
       break;
     case MotionKind::mean_speed: step.joint_speed = now.joint; break;
     case MotionKind::speed:
-      for (Eigen::Index j = 0; j < now.joint.size(); ++j) {
-        step.joint_speed[j] = 0.5 * (before.joint[j] + now.joint[j]);
-      }
+      each(now.joint.size(), [&](Eigen::Index j) { step.joint_speed[j] = 0.5 * (before.joint[j] + now.joint[j]); });
       break;
   }
   multiply(model_.motion, step.joint_speed, step.speed);
   const double error = angles_ && errors_.joint_sample > 0.0 ? measurement_.nominal_step / step.length : 1.0;
-  step.joint_error.setConstant(error * errors_.joint_sample);
-  for (Eigen::Index c = 0; c < step.speed.size(); ++c) {
-    step.speed_error[c] = error * errors_.speed_sample[c];
-  }
+  each(step.joint_error.size(), [&](Eigen::Index j) { step.joint_error[j] = error * errors_.joint_sample; });
+  each(step.speed.size(), [&](Eigen::Index c) { step.speed_error[c] = error * errors_.speed_sample[c]; });
 }
 
 // All values that may act between `begin` and `end` where logged efforts are late by anything in the declared range.
@@ -203,11 +217,11 @@ bool ElementFilter::measure_effort(std::size_t age) {
   const bool between = measurement_.changes == model::EffortChanges::between;
   // Without bounds the nominal hold is taken: the middle of what is possible would be half a step late.
   const bool hull = ranged_ || (held && between && errors_.between_samples);
-  StepEffort& e = effort_;
-  e.doubt.setZero();
+  const Eigen::Index joints = low_.size();
+  bool alike = true;  // what falls is the same as what rises
   if (hull) {
     if (ranged_) {
-      const double shift = mean ? 0.5 * step_.length : 0.0;
+      const double shift = mean ? 0.5 * present().length : 0.0;
       effort_of_range(before.t + shift, now.t + shift);
     } else {
       low_ = before.effort.cwiseMin(now.effort);
@@ -217,82 +231,80 @@ bool ElementFilter::measure_effort(std::size_t age) {
         high_ = high_.cwiseMax(sample(age - 1).effort);
       }
     }
-    for (Eigen::Index j = 0; j < low_.size(); ++j) {
-      scratch_[j] = 0.25 * (low_[j] + high_[j]);
-    }
-    multiply(model_.input, scratch_, e.falling);
-    e.rising = e.falling;
+    each(joints, [&](Eigen::Index j) { falling_in_[j] = 0.25 * (low_[j] + high_[j]); });
+  } else if (!mean && held) {
+    each(joints, [&](Eigen::Index j) {
+      low_[j] = high_[j] = now.over[j];
+      falling_in_[j] = 0.5 * now.over[j];
+    });
   } else if (!mean) {
-    if (held) {
-      low_ = high_ = now.over;
-      scratch_ = 0.5 * now.over;
-      multiply(model_.input, scratch_, e.falling);
-      e.rising = e.falling;
-    } else {
-      low_ = before.effort.cwiseMin(now.effort);
-      high_ = before.effort.cwiseMax(now.effort);
-      scratch_ = (2.0 * before.effort + now.effort) / 6.0;
-      multiply(model_.input, scratch_, e.falling);
-      scratch_ = (before.effort + 2.0 * now.effort) / 6.0;
-      multiply(model_.input, scratch_, e.rising);
-    }
-  } else {  // the stamp is in the middle of the step
+    each(joints, [&](Eigen::Index j) {
+      const double first = before.effort[j], last = now.effort[j];
+      low_[j] = std::min(first, last);
+      high_[j] = std::max(first, last);
+      falling_in_[j] = (2.0 * first + last) / 6.0;
+      rising_in_[j] = (first + 2.0 * last) / 6.0;
+    });
+    alike = false;
+  } else if (held) {  // the stamp is in the middle of the step
     const Sample& next = sample(age - 1);
-    if (held) {
-      low_ = now.over.cwiseMin(next.over);
-      high_ = now.over.cwiseMax(next.over);
-      scratch_ = (3.0 * now.over + next.over) / 8.0;
-      multiply(model_.input, scratch_, e.falling);
-      scratch_ = (now.over + 3.0 * next.over) / 8.0;
-      multiply(model_.input, scratch_, e.rising);
-    } else {
-      low_ = before.effort.cwiseMin(now.effort).cwiseMin(next.effort);
-      high_ = before.effort.cwiseMax(now.effort).cwiseMax(next.effort);
-      if (between) {
-        scratch_ = 0.5 * now.effort;
-        multiply(model_.input, scratch_, e.falling);
-        e.rising = e.falling;
-      } else {
-        scratch_ = (5.0 * before.effort + 18.0 * now.effort + next.effort) / 48.0;
-        multiply(model_.input, scratch_, e.falling);
-        scratch_ = (before.effort + 18.0 * now.effort + 5.0 * next.effort) / 48.0;
-        multiply(model_.input, scratch_, e.rising);
-      }
-    }
+    each(joints, [&](Eigen::Index j) {
+      const double first = now.over[j], last = next.over[j];
+      low_[j] = std::min(first, last);
+      high_[j] = std::max(first, last);
+      falling_in_[j] = (3.0 * first + last) / 8.0;
+      rising_in_[j] = (first + 3.0 * last) / 8.0;
+    });
+    alike = false;
+  } else {
+    const Sample& next = sample(age - 1);
+    each(joints, [&](Eigen::Index j) {
+      const double first = before.effort[j], middle = now.effort[j], last = next.effort[j];
+      low_[j] = std::min({first, middle, last});
+      high_[j] = std::max({first, middle, last});
+      falling_in_[j] = between ? 0.5 * middle : (5.0 * first + 18.0 * middle + last) / 48.0;
+      rising_in_[j] = (first + 18.0 * middle + 5.0 * last) / 48.0;
+    });
+    alike = between;
   }
-  scratch_ = 0.5 * (high_ - low_);
+  StepEffort& e = present_effort();
+  multiply(model_.input, falling_in_, e.falling);
+  if (alike) {
+    each(e.rising.size(), [&](Eigen::Index i) { e.rising[i] = e.falling[i]; });
+  } else {
+    multiply(model_.input, rising_in_, e.rising);
+  }
+  each(joints, [&](Eigen::Index j) { scratch_[j] = 0.5 * (high_[j] - low_[j]); });
   multiply_sizes(model_.input, scratch_, effort_change_);
-  if (hull) {
-    e.doubt = effort_change_;
-  }
-  for (Eigen::Index i = 0; i < e.doubt.size(); ++i) {
-    step_.effort[i] = std::abs(e.falling[i] + e.rising[i]) + effort_change_[i] + errors_.motion.effort[i];
-  }
-  return effort_is_covered(mean ? now.t + 0.5 * step_.length : now.t);
+  Eigen::VectorXd& largest = present().effort;
+  each(e.doubt.size(), [&](Eigen::Index i) {
+    e.doubt[i] = hull ? effort_change_[i] : 0.0;
+    largest[i] = std::abs(e.falling[i] + e.rising[i]) + effort_change_[i] + errors_.motion.effort[i];
+  });
+  return effort_is_covered(mean ? now.t + 0.5 * present().length : now.t);
 }
 
 bool ElementFilter::describe(std::size_t age) {
   const Sample& now = sample(age);
   const Sample& before = sample(age + 1);
-  std::swap(step_, step_before_);
-  std::swap(effort_, effort_before_);
+  newest_step_ = 1 - newest_step_;
   length_before_ = length_;
   const bool mean = measurement_.motion == MotionKind::mean_speed;
   length_ = mean && measurement_.nominal_step > 0.0 ? measurement_.nominal_step : now.t - before.t;
-  step_.length = length_;
+  present().length = length_;
   measure_motion(now, before);
   if (measurement_.heading_column.empty()) {
     const bool first = instants_ == (angles_ ? 0U : 1U);
     const auto c = static_cast<Eigen::Index>(std::max(model_.heading_coordinate, 0));
-    step_.heading =
+    present().heading =
         first || model_.heading_coordinate < 0
             ? 0.0
-            : step_before_.heading + 0.5 * (length_before_ * step_before_.speed[c] + length_ * step_.speed[c]);
+            : previous().heading + 0.5 * (length_before_ * previous().speed[c] + length_ * present().speed[c]);
   } else {
-    step_.heading = 0.5 * (before.heading + now.heading);
+    present().heading = 0.5 * (before.heading + now.heading);
   }
-  step_.heading_error = errors_.heading;
-  return measure_effort(age) && enclosure_.enclose(model_, step_);
+  present().heading_error = errors_.heading;
+  return measure_effort(age) && enclosure_.enclose(model_, present());
 }
 
 // q − `corrected`, with `covered` in doubt, both times the curvature of a parabola through three efforts, `a` and `b`
@@ -315,7 +327,7 @@ void ElementFilter::curve_effort(double a, double b, const Eigen::VectorXd& firs
 
 void ElementFilter::begin() {
   began_ = true;
-  at_rest_ = speed_.isZero(0.0) && (corrector_.empty() || effort_.falling.isZero(0.0));
+  at_rest_ = speed_.isZero(0.0) && (corrector_.empty() || present_effort().falling.isZero(0.0));
   first_length_ = length_;
   element_.number = 0;
 }
@@ -342,20 +354,21 @@ void ElementFilter::make_hat() {
   element_.length = 0.5 * (before + h);
   element_.before = before;
   element_.step = h;
-  for (Eigen::Index c = 0; c < element_.motion.size(); ++c) {
-    element_.motion[c] = 0.5 * (before * step_before_.speed[c] + h * step_.speed[c]);
-    element_.slope[c] = step_.speed[c] - step_before_.speed[c];
-    element_.motion_doubt[c] = step_.acceleration[c] * cube(h) / 12.0;
-    element_.motion_doubt_before[c] = step_before_.acceleration[c] * cube(before) / 12.0;
-  }
-  for (Eigen::Index i = 0; i < element_.torque.size(); ++i) {
-    element_.torque[i] = before * effort_before_.rising[i] + h * effort_.falling[i] - curve_[i];
-    element_.torque_doubt[i] = 0.5 * (before * effort_before_.doubt[i] + h * effort_.doubt[i]) + curve_doubt_[i];
-  }
+  const StepMotion &first = previous(), &last = present();
+  each(element_.motion.size(), [&](Eigen::Index c) {
+    element_.motion[c] = 0.5 * (before * first.speed[c] + h * last.speed[c]);
+    element_.slope[c] = last.speed[c] - first.speed[c];
+    element_.motion_doubt[c] = last.acceleration[c] * cube(h) / 12.0;
+    element_.motion_doubt_before[c] = first.acceleration[c] * cube(before) / 12.0;
+  });
+  const StepEffort &rising = previous_effort(), &falling = present_effort();
+  each(element_.torque.size(), [&](Eigen::Index i) {
+    element_.torque[i] = before * rising.rising[i] + h * falling.falling[i] - curve_[i];
+    element_.torque_doubt[i] = 0.5 * (before * rising.doubt[i] + h * falling.doubt[i]) + curve_doubt_[i];
+  });
   for (std::size_t k = 0; k < functions_.size(); ++k) {
-    const model::TermValue &first = step_before_.values[k], &second = step_.values[k];
-    element_.functions[k] = {0.5 * (before * first.value + h * second.value),
-                             0.5 * (before * first.error + h * second.error)};
+    const model::TermValue &one = first.values[k], &two = last.values[k];
+    element_.functions[k] = {0.5 * (before * one.value + h * two.value), 0.5 * (before * one.error + h * two.error)};
   }
 }
 
@@ -382,20 +395,20 @@ void ElementFilter::make_step() {
   element_.length = element_.before = element_.step = h;
   for (std::size_t c = 0; c < static_cast<std::size_t>(element_.motion.size()); ++c) {
     const auto i = static_cast<Eigen::Index>(c);
-    element_.motion[i] = h * step_.speed[i];
+    element_.motion[i] = h * present().speed[i];
     element_.slope[i] = speed_[i] - speed_before_[i];
     element_.motion_doubt[i] = 0.0;
-    if (step_.acceleration[i] > 0.0) {
-      const double change = enclosure_.change(c, model_, step_, effort_change_);
-      element_.motion_doubt[i] = std::min(0.25 * step_.acceleration[i], 0.125 * change) * h * h;
+    if (present().acceleration[i] > 0.0) {
+      const double change = enclosure_.change(c, model_, present(), effort_change_);
+      element_.motion_doubt[i] = std::min(0.25 * present().acceleration[i], 0.125 * change) * h * h;
     }
   }
   for (Eigen::Index i = 0; i < element_.torque.size(); ++i) {
-    element_.torque[i] = h * (effort_.falling[i] + effort_.rising[i]) - curve_[i];
-    element_.torque_doubt[i] = h * effort_.doubt[i] + curve_doubt_[i];
+    element_.torque[i] = h * (present_effort().falling[i] + present_effort().rising[i]) - curve_[i];
+    element_.torque_doubt[i] = h * present_effort().doubt[i] + curve_doubt_[i];
   }
   for (std::size_t k = 0; k < functions_.size(); ++k) {
-    element_.functions[k] = {h * step_.values[k].value, h * step_.values[k].error};
+    element_.functions[k] = {h * present().values[k].value, h * present().values[k].error};
   }
 }
 
@@ -466,15 +479,15 @@ bool ElementFilter::take() {
   const double h = length_;
   t_ = measurement_.motion == MotionKind::mean_speed ? now.t + 0.5 * h : now.t;
   if (angles_) {
-    joint_speed_ = step_.joint_speed;
-    speed_ = step_.speed;
-    heading_ = step_.heading;
+    joint_speed_ = present().joint_speed;
+    speed_ = present().speed;
+    heading_ = present().heading;
   } else {
     joint_speed_ = now.joint;
     multiply(model_.motion, joint_speed_, speed_);
     heading_ = measurement_.heading_column.empty()
                    ? (model_.heading_coordinate >= 0
-                          ? heading_ + h * step_.speed[static_cast<Eigen::Index>(model_.heading_coordinate)]
+                          ? heading_ + h * present().speed[static_cast<Eigen::Index>(model_.heading_coordinate)]
                           : 0.0)
                    : now.heading;
   }

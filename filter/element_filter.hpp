@@ -79,7 +79,7 @@ class ElementFilter {
   [[nodiscard]] double heading() const { return heading_; }
   [[nodiscard]] double step_length() const { return length_; }
   /// The last step.
-  [[nodiscard]] const StepMotion& last_step() const { return step_; }
+  [[nodiscard]] const StepMotion& last_step() const { return steps_[newest_step_]; }
   /// True if the segment begins at standstill without effort.
   [[nodiscard]] bool at_rest() const { return at_rest_; }
   /// True if the segment begins after lost rows.
@@ -115,6 +115,11 @@ class ElementFilter {
   [[nodiscard]] const Sample& sample(std::size_t age) const {
     return ring_[(newest_ + ring_.size() - age) % ring_.size()];
   }
+  // The last step, and the one before it.
+  [[nodiscard]] StepMotion& present() { return steps_[newest_step_]; }
+  [[nodiscard]] const StepMotion& previous() const { return steps_[1 - newest_step_]; }
+  [[nodiscard]] StepEffort& present_effort() { return efforts_[newest_step_]; }
+  [[nodiscard]] const StepEffort& previous_effort() const { return efforts_[1 - newest_step_]; }
   void read(double t, std::span<const double> sample);
   void read_effort(Sample& now, std::span<const double> sample);
   [[nodiscard]] bool take();
@@ -153,10 +158,11 @@ class ElementFilter {
   double first_length_ = 0.0;
   double heading_ = 0.0;
   Eigen::VectorXd speed_, speed_before_, joint_speed_;
-  StepMotion step_, step_before_;
-  StepEffort effort_, effort_before_;
+  std::array<StepMotion, 2> steps_;
+  std::array<StepEffort, 2> efforts_;
+  std::size_t newest_step_ = 0;
   Eigen::VectorXd curve_, curve_doubt_;  // of the efforts about the node
-  Eigen::VectorXd low_, high_, scratch_, effort_change_;
+  Eigen::VectorXd low_, high_, scratch_, falling_in_, rising_in_, effort_change_;
   WeakElement element_;
 };
 

@@ -11,6 +11,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
 
 #include <wheelwright/filter/measurement.hpp>
 
@@ -95,6 +99,14 @@ struct Cascade {
   void increment(const StepWeights& w, double by) { advance(w, w.increment1() * by, w.increment2() * by); }
 };
 
+/// A number that only fades ends as a denormal one, for ever, which takes a processor many times as long: every kFade
+/// samples a filter takes what is smaller than kTrace for 0. That is far below the rounding of anything measured.
+inline constexpr double kTrace = 0x1p-800;
+inline constexpr std::size_t kFade = 64;
+
+/// `x`, or 0 for a trace.
+inline double faded(double x) { return std::abs(x) < kTrace ? 0.0 : x; }
+
 /// Σ q_k P(x_k) e^{−x_k} with P(x) = 1 − x + x²/2, x_k = β(t − t_k), over impulses q_k >= 0 at the times t_k: at least
 /// Σ q_k sup |1 − x| e^{−x} over x >= x_k, since |1 − x| <= P(x) and P(x)e^{−x} falls. α² times it bounds what the
 /// slope of f₂ makes of the impulses.
@@ -110,6 +122,12 @@ struct SlopeMajorant {
     s0 = decay * s0 + q;
   }
   [[nodiscard]] double value() const { return s0 - s1 + 0.5 * s2; }
+  /// Forgets traces.
+  void fade() {
+    s0 = faded(s0);
+    s1 = faded(s1);
+    s2 = faded(s2);
+  }
 };
 
 /// One filtered signal: Σ q_k x_k^i e^{−βx_k} for i = 0 and 1, and Σ q_k e^{−γx_k}, over what went in at the times t −
@@ -118,6 +136,40 @@ struct KernelState {
   double z1 = 0.0;
   double z2 = 0.0;
   double fast = 0.0;
+};
+
+/// Many KernelStates, part by part, that take what is in `in` together and give what is in `out`: the digits that each
+/// of them would have by itself, several at a time.
+class KernelBank {
+ public:
+  KernelBank() = default;
+  /// `signals` of them, in a segment that has not begun.
+  explicit KernelBank(std::size_t signals)
+      : signals_(signals), rows_((signals + kLane - 1) / kLane * kLane), numbers_(5 * rows_, 0.0) {}
+
+  [[nodiscard]] std::size_t signals() const { return signals_; }
+  /// `signals` each; what was written to in() stays there.
+  [[nodiscard]] double* in() { return numbers_.data(); }
+  [[nodiscard]] double* out() { return numbers_.data() + rows_; }
+  [[nodiscard]] const double* out() const { return numbers_.data() + rows_; }
+  [[nodiscard]] double* z1() { return numbers_.data() + 2 * rows_; }
+  [[nodiscard]] double* z2() { return numbers_.data() + 3 * rows_; }
+  [[nodiscard]] double* fast() { return numbers_.data() + 4 * rows_; }
+  [[nodiscard]] const double* z1() const { return numbers_.data() + 2 * rows_; }
+  [[nodiscard]] const double* z2() const { return numbers_.data() + 3 * rows_; }
+  [[nodiscard]] const double* fast() const { return numbers_.data() + 4 * rows_; }
+
+  /// Forgets everything, in() too.
+  void clear() { std::fill(numbers_.begin(), numbers_.end(), 0.0); }
+  /// Forgets traces.
+  void fade() { std::transform(z1(), numbers_.data() + numbers_.size(), z1(), faded); }
+
+ private:
+  friend class FilterKernel;
+  static constexpr std::size_t kLane = 4;  // that are worked on without looking whether there are as many
+
+  std::size_t signals_ = 0, rows_ = 0;
+  std::vector<double> numbers_;
 };
 
 /// For speeds: f (24), or f₂ = f * f, as means over the steps. For angles and mean speeds: f₂ * γe^{−γt} at the
@@ -176,6 +228,32 @@ class FilterKernel {
     } else {
       s.z2 = weights_.decay() * (s.z2 + step_ * s.z1) + weights_.increment2() * q;
       s.z1 = weights_.decay() * s.z1 + weights_.increment1() * q;
+    }
+  }
+
+  /// take() and value() of every signal of `bank`.
+  void take(KernelBank& bank) const {
+    using Lane = Eigen::Array<double, KernelBank::kLane, 1>;
+    const double decay = weights_.decay(), step = step_, fast = fast_;
+    for (std::size_t first = 0; first < bank.rows_; first += KernelBank::kLane) {
+      const Lane in = Eigen::Map<const Lane>(bank.in() + first);
+      Eigen::Map<Lane> z1(bank.z1() + first), z2(bank.z2() + first), rest(bank.fast() + first), out(bank.out() + first);
+      if (nodes_) {
+        const Lane sum = z1 + in;
+        z2 = decay * (z2 + step * sum);
+        z1 = decay * sum;
+        rest = fast * (rest + in);
+      } else {
+        z2 = decay * (z2 + step * z1) + weights_.increment2() * in;
+        z1 = decay * z1 + weights_.increment1() * in;
+      }
+      if (order_ == 1) {
+        out = gain_ * z1;
+      } else if (smooth_) {
+        out = gain_ * (slow_ * z2 - quick_ * (z1 - rest));
+      } else {
+        out = gain_ * z2;
+      }
     }
   }
 

@@ -257,14 +257,16 @@ bool StepEnclosure::enclose(const Model& model, StepMotion& step) const {
       for (int round = 0; round < kRounds && !settled; ++round) {
         found = (round < 2 ? 1.0 : 1.5) * next_;
         evaluate(model, step);
-        settled = solve() && (next_.array() <= found.array()).all();
+        // Without functions nothing that is solved for depends on `found`.
+        settled = (step.values.empty() || solve()) && (next_.array() <= found.array()).all();
       }
     }
     if (settled) {
       known = true;
-      if (limited) {
-        found = found.cwiseMin(bound_.limit);
+      if (!limited) {
+        return true;  // with what was evaluated last
       }
+      found = found.cwiseMin(bound_.limit);
     } else if (limited) {
       found = bound_.limit;
     }

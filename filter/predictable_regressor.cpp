@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <wheelwright/core/check.hpp>
+#include <wheelwright/filter/kernel.hpp>
 #include <wheelwright/filter/sample_weights.hpp>
 
 namespace wheelwright::filter {
@@ -33,6 +34,12 @@ void PredictableRegressor::release(const Waiting& element) {
   z_[0] += forgotten * (element.Y / element.length - z_[0]);
   for (std::size_t i = 1; i < kOrder; ++i) {
     z_[i] += forgotten * (z_[i - 1] - z_[i]);
+  }
+}
+
+void PredictableRegressor::fade() {
+  for (core::RowMatrix& z : z_) {
+    z = z.unaryExpr(&faded);
   }
 }
 

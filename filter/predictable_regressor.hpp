@@ -30,6 +30,8 @@ class PredictableRegressor {
   void begin();
   /// Takes the newest element; value() is its weight then.
   void take(const ElementFilter& elements);
+  /// Forgets traces (kTrace).
+  void fade();
   /// n × p.
   [[nodiscard]] const core::RowMatrix& value() const { return value_; }
 

@@ -17,15 +17,28 @@ RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement m
   const Model& m = this->model();
   const auto n = static_cast<Eigen::Index>(m.n());
   kernel_ = FilterKernel(design_, this->measurement().motion, this->measurement().nominal_step);
-  for (auto* per_coordinate : {&motion_, &slope_, &motion_doubt_}) {
-    per_coordinate->resize(m.coordinates.size());
+  const std::size_t coordinates = m.coordinates.size(), functions = elements_.functions().size();
+  torque_ = 2 * coordinates;
+  area_ = torque_ + m.n();
+  start_ = area_ + 1;
+  functions_ = start_ + 1;
+  torque_doubt_ = functions_ + functions;
+  function_doubt_ = torque_doubt_ + m.n();
+  motion_doubt_ = function_doubt_ + functions;
+  bank_ = KernelBank(elements_.angles() ? motion_doubt_ : motion_doubt_ + coordinates);
+  static_gain_ = design_.static_gain();
+  error_.resize(2 * coordinates);
+  slope_doubt_.resize(coordinates);
+  first_doubt_.resize(coordinates);
+  for (const Term& term : m.terms) {
+    const std::size_t at = term.output * m.p() + term.parameter;
+    if (term.kind == Term::Kind::function) {
+      function_entries_.push_back({at, functions_ + function_entries_.size(), 1.0});
+    } else {
+      entries_.push_back(
+          {at, term.kind == Term::Kind::speed ? term.coordinate : coordinates + term.coordinate, term.scale});
+    }
   }
-  slope_doubt_.resize(m.coordinates.size());
-  first_doubt_.resize(m.coordinates.size());
-  torque_.resize(m.n());
-  torque_doubt_.resize(m.n());
-  functions_.resize(elements_.functions().size());
-  function_doubt_.resize(elements_.functions().size());
   row_.Y = core::RowMatrix::Zero(n, static_cast<Eigen::Index>(m.p()));
   row_.dY = row_.Y;
   row_.y = Eigen::VectorXd::Zero(n);
@@ -33,11 +46,8 @@ RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement m
 }
 
 void RegressorFilter::begin() {
-  for (auto* states : {&motion_, &slope_, &torque_, &torque_doubt_, &motion_doubt_, &functions_, &function_doubt_}) {
-    std::fill(states->begin(), states->end(), KernelState{});
-  }
+  bank_.clear();
   std::fill(slope_doubt_.begin(), slope_doubt_.end(), SlopeMajorant{});
-  area_ = start_ = {};
   const double length = elements_.first_length();
   for (std::size_t c = 0; c < first_doubt_.size(); ++c) {
     first_doubt_[c] = elements_.last_step().acceleration[static_cast<Eigen::Index>(c)] * length * length / 12.0;
@@ -46,28 +56,33 @@ void RegressorFilter::begin() {
 
 void RegressorFilter::follow() {
   const WeakElement& e = elements_.element();
-  for (std::size_t c = 0; c < motion_.size(); ++c) {
+  const std::size_t coordinates = slope_doubt_.size(), outputs = area_ - torque_;
+  double* const in = bank_.in();
+  if (e.number % kFade == 0) {
+    bank_.fade();
+    std::ranges::for_each(slope_doubt_, &SlopeMajorant::fade);
+  }
+  for (std::size_t c = 0; c < coordinates; ++c) {
     const auto i = static_cast<Eigen::Index>(c);
-    kernel_.take(motion_[c], e.motion[i]);
-    kernel_.take(slope_[c], e.slope[i]);
+    in[c] = e.motion[i];
+    in[coordinates + c] = e.slope[i];
     if (elements_.angles()) {
       slope_doubt_[c].advance(kernel_.decay(), design_.beta * e.step, e.motion_doubt[i]);
     } else {
-      kernel_.take(motion_doubt_[c], e.motion_doubt[i]);
+      in[motion_doubt_ + c] = e.motion_doubt[i];
     }
   }
-  for (std::size_t i = 0; i < torque_.size(); ++i) {
-    kernel_.take(torque_[i], e.torque[static_cast<Eigen::Index>(i)]);
-    kernel_.take(torque_doubt_[i], e.torque_doubt[static_cast<Eigen::Index>(i)]);
+  for (std::size_t k = 0; k < outputs; ++k) {
+    in[torque_ + k] = e.torque[static_cast<Eigen::Index>(k)];
+    in[torque_doubt_ + k] = e.torque_doubt[static_cast<Eigen::Index>(k)];
   }
-  for (std::size_t k = 0; k < functions_.size(); ++k) {
-    kernel_.take(functions_[k], e.functions[k].value);
-    kernel_.take(function_doubt_[k], e.functions[k].error);
+  for (std::size_t k = 0; k < e.functions.size(); ++k) {
+    in[functions_ + k] = e.functions[k].value;
+    in[function_doubt_ + k] = e.functions[k].error;
   }
-  kernel_.take(area_, e.length);
-  if (elements_.angles()) {
-    kernel_.take(start_, e.number == 1 ? 1.0 : 0.0);
-  }
+  in[area_] = e.length;
+  in[start_] = elements_.angles() && e.number == 1 ? 1.0 : 0.0;
+  kernel_.take(bank_);
 }
 
 bool RegressorFilter::step(double t, std::span<const double> sample) {
@@ -95,56 +110,47 @@ bool RegressorFilter::settled() const {
   }
   // 2n̄/h of the first step, times the weight of its end, against sup |f₂ * n̈|.
   return elements_.after_loss() && since * design_.beta >= 1.0 &&
-         kernel_.value(start_) / (kernel_.gain() * elements_.first_length()) <= 1.0 + std::exp(-2.0);
+         bank_.out()[start_] / (kernel_.gain() * elements_.first_length()) <= 1.0 + std::exp(-2.0);
 }
 
 void RegressorFilter::write_row() {
-  const Model& model = elements_.model();
   const SignalErrors& errors = elements_.errors();
-  const bool angles = elements_.angles();
-  row_.Y.setZero();
-  row_.dY.setZero();
-  const bool bounded = errors.between_samples;
+  const bool angles = elements_.angles(), bounded = errors.between_samples;
+  const std::size_t coordinates = slope_doubt_.size();
+  const double* const out = bank_.out();
   // The kernel rises from 0 to the weight of the first node: the slope of that has errors of its own.
-  const double start = angles ? kernel_.value(start_) : 0.0;
+  const double start = angles ? out[start_] : 0.0;
   const double first =
       start > 0.0 && errors.joint_sample > 0.0 ? start * measurement().nominal_step / elements_.first_length() : 0.0;
-  for (const Term& term : model.terms) {
-    if (term.kind == Term::Kind::function) {
-      continue;
+  for (std::size_t c = 0; c < coordinates; ++c) {
+    const auto i = static_cast<Eigen::Index>(c);
+    double error = errors.speed[i];
+    if (bounded) {
+      error += angles ? kernel_.gain() * kernel_.majorant_gain() * slope_doubt_[c].value() + start * first_doubt_[c]
+                      : out[motion_doubt_ + c];
     }
-    const auto i = static_cast<Eigen::Index>(term.output);
-    const auto j = static_cast<Eigen::Index>(term.parameter);
-    const auto c = static_cast<Eigen::Index>(term.coordinate);
-    double value = 0.0;
-    double error = 0.0;
-    if (term.kind == Term::Kind::speed) {
-      value = kernel_.value(motion_[term.coordinate]);
-      error = errors.speed[c];
-      if (bounded) {
-        error += angles ? kernel_.gain() * kernel_.majorant_gain() * slope_doubt_[term.coordinate].value() +
-                              start * first_doubt_[term.coordinate]
-                        : kernel_.value(motion_doubt_[term.coordinate]);
-      }
-    } else {
-      value = kernel_.value(slope_[term.coordinate]);
-      error = errors.acceleration[c] + first * errors.speed_sample[c];
+    error_[c] = error;
+    error_[coordinates + c] = errors.acceleration[i] + first * errors.speed_sample[i];
+  }
+  double *const Y = row_.Y.data(), *const dY = row_.dY.data();
+  for (const auto* entries : {&entries_, &function_entries_}) {
+    for (const Entry& entry : *entries) {
+      Y[entry.at] = dY[entry.at] = 0.0;
     }
-    row_.Y(i, j) += term.scale * value;
-    row_.dY(i, j) += std::abs(term.scale) * error;
   }
-  for (std::size_t k = 0; k < functions_.size(); ++k) {
-    const Term& term = model.terms[elements_.functions()[k]];
-    const auto i = static_cast<Eigen::Index>(term.output);
-    const auto j = static_cast<Eigen::Index>(term.parameter);
-    row_.Y(i, j) += kernel_.value(functions_[k]);
-    row_.dY(i, j) += kernel_.value(function_doubt_[k]);
+  for (const Entry& entry : entries_) {
+    Y[entry.at] += entry.scale * out[entry.signal];
+    dY[entry.at] += std::abs(entry.scale) * error_[entry.signal];
   }
-  const double area = bounded ? std::max(1.0, kernel_.value(area_) / design_.static_gain()) : 1.0;
-  for (std::size_t i = 0; i < torque_.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    row_.y[k] = kernel_.value(torque_[i]);
-    row_.dy[k] = area * errors.output[k] + (bounded ? kernel_.value(torque_doubt_[i]) : 0.0);
+  for (const Entry& entry : function_entries_) {
+    Y[entry.at] += out[entry.signal];
+    dY[entry.at] += out[entry.signal - functions_ + function_doubt_];
+  }
+  const double area = bounded ? std::max(1.0, out[area_] / static_gain_) : 1.0;
+  for (Eigen::Index i = 0; i < row_.y.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    row_.y[i] = out[torque_ + k];
+    row_.dy[i] = area * errors.output[i] + (bounded ? out[torque_doubt_ + k] : 0.0);
   }
 }
 

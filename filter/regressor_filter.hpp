@@ -109,17 +109,26 @@ class RegressorFilter {
   [[nodiscard]] bool settled() const;
   void write_row();
 
+  // An entry of Y_f: a multiple of a filtered signal, with a multiple of that signal's error.
+  struct Entry {
+    std::size_t at = 0;      // of the n × p of a row
+    std::size_t signal = 0;  // of motion or slope
+    double scale = 1.0;
+  };
+
   ElementFilter elements_;
   FilterDesign design_;
   FilterKernel kernel_;
-  std::vector<KernelState> motion_;  // driven by the coordinates' speeds
-  std::vector<KernelState> slope_;   // driven by their derivatives
-  std::vector<KernelState> torque_, torque_doubt_;
-  std::vector<KernelState> functions_, function_doubt_;
-  std::vector<KernelState> motion_doubt_;   // speeds: error of the trapezoidal rule
-  std::vector<SlopeMajorant> slope_doubt_;  // angles: the same, by the slope of the kernel
+  double static_gain_ = 1.0;
+  // Per coordinate its speed and its slope, per output its torque, an area, the first node alone, functions; and what
+  // is in doubt of torque, functions and, for speeds, of the trapezoidal rule.
+  KernelBank bank_;
+  std::size_t torque_ = 0, area_ = 0, start_ = 0, functions_ = 0;
+  std::size_t torque_doubt_ = 0, function_doubt_ = 0, motion_doubt_ = 0;
+  std::vector<Entry> entries_, function_entries_;
+  std::vector<double> error_;               // of speeds and slopes
+  std::vector<SlopeMajorant> slope_doubt_;  // angles: what motion_doubt_ is for speeds, by the slope of the kernel
   std::vector<double> first_doubt_;         // of a segment's first step, where the kernel rises from 0
-  KernelState area_, start_;                // of a constant 1, and of the first node alone
   FilteredRow row_;
 };
 

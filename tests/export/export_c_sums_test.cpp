@@ -284,6 +284,27 @@ TEST_F(ExportCSums, SayAsTheLibraryWithEveryRule) {
   expect_same(c, "the box");
 }
 
+// Sums that only fade would end as denormal numbers, for ever, and take many times as long.
+TEST_F(ExportCSums, OfARobotAtRestNothingIsLeft) {
+  const Case c{.model = drive(false), .hold = Hold::zero_order, .bounded = false};
+  Pair both(directory_, online_model(c), c.options);
+  std::vector<double> sample(4, 0.0);
+  for (std::size_t k = 0; k < 50000; ++k) {
+    const double t = 0.01 * static_cast<double>(k), moving = t < 5.0 ? 1.0 : 0.0;
+    sample[0] += moving * 0.01 * std::sin(t);
+    sample[1] += moving * 0.01 * std::sin(2.0 * t);
+    sample[2] = moving * std::cos(t);
+    sample[3] = moving * std::cos(2.0 * t);
+    both.step(t, sample);
+    for (const detector::SumState& look : both.ours().looks()) {
+      const bool last = k > 45000 && look.scale < 2;
+      ASSERT_TRUE(!last || (look.value == 0.0 && std::fpclassify(look.c0) != FP_SUBNORMAL)) << k << ' ' << look.value;
+    }
+  }
+  EXPECT_EQ(both.different, 0u);
+  EXPECT_GT(both.looks, 1000u);
+}
+
 // A set that is too rich for a table: its box stands for it, and the header says so.
 TEST_F(ExportCSums, HaveTheBoxWhereTheSetHasTooManyVertices) {
   const Case c{.model = drive(true)};

@@ -427,6 +427,28 @@ TEST_F(ExportC, TakesWhatIsNoNumberForLost) {
   }
 }
 
+// What only fades would end as denormal numbers, for ever: a parked robot's detector would take many times as long.
+TEST_F(ExportC, OfARobotAtRestNothingIsLeft) {
+  for (const MotionKind motion : {MotionKind::angle, MotionKind::mean_speed, MotionKind::speed}) {
+    SCOPED_TRACE(static_cast<int>(motion));
+    const Case c{.model = drive(false, false), .motion = motion, .hold = Hold::zero_order, .noisy = false};
+    Detector ours = detector_of(c);
+    CDetector theirs(directory_, c_header(ours, {.name = "robot"}), "robot", 4, 2);
+    ASSERT_TRUE(theirs.loaded());
+    std::vector<double> t, samples;
+    World(c).rows(400, t, samples);
+    for (std::size_t k = 0; k < 20000; ++k) {
+      t.push_back(t.back() + 0.01);
+      const std::size_t last = samples.size() - 4;
+      const bool angle = motion == MotionKind::angle;
+      samples.insert(samples.end(), {angle ? samples[last] : 0.0, angle ? samples[last + 1] : 0.0, 0.0, 0.0});
+    }
+    EXPECT_EQ(testing_support::compare(ours, theirs, t, samples).different, 0u);
+    EXPECT_TRUE(ours.filter().row().Y.isZero(0.0)) << ours.filter().row().Y;
+    EXPECT_TRUE(ours.filter().row().y.isZero(0.0));
+  }
+}
+
 TEST_F(ExportC, DecidesAsTheLibraryWithEveryRule) {
   Case c{.model = drive(false, true)};
   c.options.persistence = detector::Persistence{.k = 3, .n = 5};
