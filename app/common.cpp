@@ -126,6 +126,7 @@ std::mutex& made_mutex() {
 }
 
 constexpr std::string_view kPage = "report.html";
+constexpr std::string_view kGathered = ".wheelwright-part";
 constexpr std::string_view kHead = "<head>\n";
 constexpr std::chrono::seconds kOneRun(10);  // between files that one run writes, when a directory is copied, too
 
@@ -149,6 +150,20 @@ std::string beginning(const std::filesystem::path& file) {
   return text;
 }
 
+// Where the result may stand by which the files in `out` are known: in its place, and, of runs that were killed when they
+// had put some files in place, where they had gathered them.
+std::vector<std::filesystem::path> results_of(const CommonOptions& options, const std::string& result) {
+  std::vector<std::filesystem::path> all = {options.out / result};
+  std::error_code none;
+  for (auto entry = std::filesystem::directory_iterator(options.out, none);
+       !none && entry != std::filesystem::directory_iterator(); entry.increment(none)) {
+    if (entry->path().filename().native().starts_with(kGathered)) {
+      all.push_back(entry->path() / result);
+    }
+  }
+  return all;
+}
+
 // Empty where this command may replace the file `name` of its results, the first of which is `result`; else whose the
 // file is.
 std::string whose(const CommonOptions& options, const std::string& result, const std::string& name) {
@@ -169,13 +184,18 @@ std::string whose(const CommonOptions& options, const std::string& result, const
   if (name == result) {
     return made_here(text) ? "" : "no result of " + command;
   }
-  if (!made_here(beginning(options.out / result))) {
-    return "not written by " + command;
+  std::string other = "not written by " + command;
+  for (const std::filesystem::path& told : results_of(options, result)) {
+    if (made_here(beginning(told))) {
+      std::error_code error;
+      const auto written = std::filesystem::last_write_time(told, error);
+      if (std::filesystem::last_write_time(place, error) <= written + kOneRun) {
+        return "";
+      }
+      other = "changed since " + command + " wrote it";
+    }
   }
-  std::error_code error;
-  const auto of_result = std::filesystem::last_write_time(options.out / result, error);
-  return std::filesystem::last_write_time(place, error) > of_result + kOneRun ? "changed since " + command + " wrote it"
-                                                                              : "";
+  return other;
 }
 
 }  // namespace
@@ -243,7 +263,7 @@ namespace {
 struct Gathering {
   explicit Gathering(const std::filesystem::path& place)
       : out(place),
-        directory(place / ".wheelwright-part", files::Temporary::Kind::directory, place.string(),
+        directory(place / kGathered, files::Temporary::Kind::directory, place.string(),
                   "a writable place with room on the disk") {}
 
   std::filesystem::path out;
@@ -272,16 +292,12 @@ std::string named_page(const CommonOptions& options, std::string page) {
 }
 
 // Links stay what they are, and pipes and devices are written to.
-void put_in_place(const std::filesystem::path& from, const std::filesystem::path& to) {
+bool is_to_be_renamed(const std::filesystem::path& to) {
   const std::filesystem::file_status there = std::filesystem::symlink_status(to);
-  if (!std::filesystem::exists(there) || std::filesystem::is_regular_file(there)) {
-    std::error_code error;
-    std::filesystem::rename(from, to, error);
-    if (error) {
-      throw InputError(to.string() + ": cannot be written (" + error.message() + "): expected a writable place");
-    }
-    return;
-  }
+  return !std::filesystem::exists(there) || std::filesystem::is_regular_file(there);
+}
+
+void write_to(const std::filesystem::path& to, const std::filesystem::path& from) {
   std::ifstream in(from, std::ios::binary);
   files::AtomicFile out(to);
   std::string piece(std::size_t{1} << 16, '\0');
@@ -311,16 +327,19 @@ void publish(const CommonOptions& options, const Json& result, const std::string
     const std::filesystem::path& from = all.directory.path();
     files::atomic_write(from / kPage, named_page(options, report));
     files::write_json(from / name, result);
-    for (const std::string& dropped : all.dropped) {
-      std::filesystem::remove(options.out / dropped);
-    }
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(from)) {
       names.push_back(entry.path().filename().string());
     }
     std::ranges::sort(names, {}, [&](const std::string& each) { return std::pair(each == name, each); });
-    for (const std::string& each : names) {
-      put_in_place(from / each, options.out / each);
+    // Files one after another and without a break; before them what is written to as it is, which may wait for a reader.
+    const auto renamed = std::ranges::stable_partition(
+        names, [&](const std::string& each) { return !is_to_be_renamed(options.out / each); });
+    std::for_each(names.begin(), renamed.begin(),
+                  [&](const std::string& each) { write_to(options.out / each, from / each); });
+    if (const std::string why = files::move_together(from, options.out, {renamed.begin(), renamed.end()}, all.dropped);
+        !why.empty()) {
+      throw InputError(why + ": expected a writable place");
     }
     discard_gathered();
   }

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -128,10 +130,17 @@ int run(const Arguments& a) {
   examine.commission.noise_mode = a.statistical ? filter::NoiseMode::statistical : filter::NoiseMode::worst_case;
   ItemsToRun items;
   items.work.items = robots.size();
+  std::vector<std::string> keys;  // of the files as they are now: a result belongs to these
+  std::ranges::transform(robots, std::back_inserter(keys), robots::key_of);
   items.work.evaluate = [&](std::size_t item) {
-    return results::record_text(study::examine_robot(results::logs_of(robots[item], reading), examine));
+    std::string record = results::record_text(study::examine_robot(results::logs_of(robots[item], reading), examine));
+    if (robots::key_of(robots[item]) != keys[item]) {
+      throw InputError(robots[item].name +
+                       ": its files were written to while they were read: expected logs that are complete");
+    }
+    return record;
   };
-  items.key = [&](std::size_t item) { return robots::key_of(robots[item]); };
+  items.key = [&](std::size_t item) { return keys[item]; };
   items.plan = plan_of(a, own);
   std::optional<Progress> progress(a.common.quiet);
   const ItemsRun run = run_items(items, a.common, a.scale, [&](std::size_t done, std::size_t all) {

@@ -34,6 +34,12 @@ Living& living() {
   return all;
 }
 
+// Held while renames that belong together are made.
+std::mutex& together() {
+  static std::mutex mutex;
+  return mutex;
+}
+
 bool holds_lock(int descriptor, bool directory) {
   if (directory) {
     return flock(descriptor, LOCK_EX | LOCK_NB) == 0;
@@ -88,6 +94,11 @@ int made(const fs::path& path, Temporary::Kind kind) {
     return -1;
   }
   return descriptor;
+}
+
+// Brings to disk what is open. Returns why not; file systems that cannot be asked are none's fault.
+std::string synced(int descriptor) {
+  return fsync(descriptor) == 0 || errno == EINVAL || errno == ENOSYS ? "" : std::strerror(errno);
 }
 
 constexpr std::string_view part = ".wheelwright-part";
@@ -145,8 +156,8 @@ Temporary::~Temporary() {
 
 std::string Temporary::move_to(const fs::path& place) {
   const std::scoped_lock guard(living().mutex);
-  if (fsync(lock_) != 0 && errno != EINVAL && errno != ENOSYS) {
-    return std::strerror(errno);
+  if (std::string why = synced(lock_); !why.empty()) {
+    return why;
   }
   std::error_code error;
   fs::rename(path_, place, error);
@@ -154,11 +165,59 @@ std::string Temporary::move_to(const fs::path& place) {
     return error.message();
   }
   living().paths.erase(std::exchange(path_, {}));
-  return {};
+  return sync_directory(place.parent_path());
+}
+
+std::string sync_directory(const fs::path& directory) {
+  const int descriptor = open(directory.empty() ? "." : directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) {
+    return errno == EACCES ? "" : std::strerror(errno);
+  }
+  std::string why = synced(descriptor);
+  close(descriptor);
+  return why;
+}
+
+std::string move_together(const fs::path& from, const fs::path& to, const std::vector<std::string>& names,
+                          const std::vector<std::string>& gone) {
+  const std::scoped_lock guard(together());
+  const fs::path earlier = from / "earlier";  // second names of what is replaced
+  std::error_code error, ignored;
+  fs::create_directory(earlier, ignored);
+  std::vector<std::string> done;
+  const auto replace = [&](const std::string& name, bool by_nothing) {
+    const bool there = fs::exists(fs::symlink_status(to / name, ignored));
+    std::error_code unkept;
+    if (there) {
+      fs::create_hard_link(to / name, earlier / name, unkept);
+    }
+    by_nothing ? static_cast<void>(fs::remove(to / name, error)) : fs::rename(from / name, to / name, error);
+    if (!error && !unkept) {
+      done.push_back(name);
+    }
+    return error ? (to / name).string() + ": cannot be written (" + error.message() + ")" : std::string();
+  };
+  std::string why;
+  for (auto name = gone.begin(); why.empty() && name != gone.end(); ++name) {
+    why = replace(*name, true);
+  }
+  for (auto name = names.begin(); why.empty() && name != names.end(); ++name) {
+    why = replace(*name, false);
+  }
+  if (why.empty()) {
+    why = sync_directory(to);
+    return why.empty() ? why : to.string() + ": cannot be brought to disk (" + why + ")";
+  }
+  for (const std::string& name : done) {
+    fs::exists(earlier / name, ignored) ? fs::rename(earlier / name, to / name, ignored)
+                                        : static_cast<void>(fs::remove(to / name, ignored));
+  }
+  return why;
 }
 
 void remove_temporaries() {
-  living().mutex.lock();  // and never given back
+  together().lock();  // and never given back
+  living().mutex.lock();
   for (const fs::path& path : living().paths) {
     std::error_code ignored;
     fs::remove_all(path, ignored);

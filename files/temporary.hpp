@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace wheelwright::files {
 
@@ -25,13 +26,27 @@ class Temporary {
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-  /// Renames it, on disk with all that was written to it, to `place`. Returns why not, in words; empty where it did.
+  /// Renames it, on disk with all that was written to it, to `place`, and brings the new name to disk: a power cut leaves
+  /// what was there or what is new, either whole. Returns why not, in words; empty where it did.
   [[nodiscard]] std::string move_to(const std::filesystem::path& place);
 
  private:
   std::filesystem::path path_;  ///< empty behind move_to()
   int lock_ = -1;               ///< descriptor that holds the lock
 };
+
+/// Brings the names in `directory` (the working one where that is empty) to disk: what was renamed there is found there
+/// after a power cut. Returns why not, in words; empty where it did, where the file system cannot be asked, and for a
+/// directory that may be written and not read.
+[[nodiscard]] std::string sync_directory(const std::filesystem::path& directory);
+
+/// Renames the files `names` of `from`, on disk, into the directory `to`, in order, and removes `gone` there before: what
+/// belongs together is there together. An interruption (remove_temporaries()) waits until it is done; where one cannot be
+/// renamed, those before it are undone, on file systems that know hard links; a run that is killed leaves the first ones.
+/// Returns why not, in words; empty where all are on disk. For files of one directory that lies in the other.
+[[nodiscard]] std::string move_together(const std::filesystem::path& from, const std::filesystem::path& to,
+                                        const std::vector<std::string>& names,
+                                        const std::vector<std::string>& gone = {});
 
 /// Removes all that live, and lets no more be made: for a program that ends now, whatever its threads are at. To be
 /// called outside of signal handlers.

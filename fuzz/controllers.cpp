@@ -14,7 +14,8 @@ using namespace wheelwright;
 // What is read of a controller is > 0 and finite, and the robot file that is made of it is read as the same robot.
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   return fuzz::clean([&] {
-    const robots::DriveFacts facts = robots::parse_ros2_control(fuzz::text_of(data, size), "controllers.yaml");
+    const robots::DriveFacts facts =
+        robots::parse_ros2_control(fuzz::text_of(data, size, fuzz::kLongestControllers), "controllers.yaml");
     for (const auto* number : {&facts.wheel_radius, &facts.track_width, &facts.speed, &facts.yaw_rate,
                                &facts.acceleration, &facts.yaw_acceleration, &facts.wheel_effort}) {
       fuzz::require(!*number || (std::isfinite((*number)->value) && (*number)->value > 0.0));

@@ -21,9 +21,23 @@
 
 namespace wheelwright::fuzz {
 
+/// Bytes of the longest input of which a log's promises are asked, each of which reads or writes it again. Of longer
+/// ones time and memory of the reading alone are measured (tests/fuzz/mutations_test.cpp).
+inline constexpr std::size_t kMostPromised = 65536;
+
+/// Bytes of the longest robot file, scenario and study, and of the longest file of controllers: what is longer is
+/// refused before it is parsed.
+inline constexpr std::size_t kLongestYaml = std::size_t{1} << 20;
+inline constexpr std::size_t kLongestControllers = std::size_t{1} << 20;
+
 /// The input as text.
 inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
   return {reinterpret_cast<const char*>(data), size};
+}
+
+/// The same, where it is no longer than `longest`; else nothing.
+inline std::string_view text_of(const std::uint8_t* data, std::size_t size, std::size_t longest) {
+  return size <= longest ? text_of(data, size) : std::string_view();
 }
 
 /// Calls `use`; an InputError is what bad input is to have.
@@ -54,12 +68,12 @@ void promised(const Use& use) {
   }
 }
 
-/// A file that is gone with the process.
+/// A file or folder that is gone with the process.
 struct FileOfProcess {
   std::filesystem::path path;
   ~FileOfProcess() {
     std::error_code ignored;
-    std::filesystem::remove(path, ignored);
+    std::filesystem::remove_all(path, ignored);
   }
 };
 

@@ -61,5 +61,6 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::require(std::filesystem::file_size(path) == bytes && std::filesystem::file_size(beside) == size - 1 &&
                 std::filesystem::exists(victim));
   std::filesystem::remove(beside);
+  std::filesystem::remove(victim);
   return 0;
 }

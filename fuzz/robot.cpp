@@ -10,7 +10,7 @@ using namespace wheelwright;
 // A robot file that is read is written as one that says the same, and so is its JSON.
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   return fuzz::clean([&] {
-    const Robot robot = robots::parse_robot(fuzz::text_of(data, size), "robot.yaml");
+    const Robot robot = robots::parse_robot(fuzz::text_of(data, size, fuzz::kLongestYaml), "robot.yaml");
     const Json object = robots::to_json(robot);
     fuzz::promised([&] {
       fuzz::require(robots::to_json(robots::parse_robot(robots::robot_yaml(robot), "again.yaml")) == object);

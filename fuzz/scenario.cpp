@@ -18,7 +18,7 @@ constexpr double kMostRows = 500.0;  // that are simulated
 // A scenario that is read is one that can be simulated, and where it is short its log is clean.
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   return fuzz::clean([&] {
-    Scenario scenario = results::parse_scenario(fuzz::text_of(data, size), "scenario.yaml");
+    Scenario scenario = results::parse_scenario(fuzz::text_of(data, size, fuzz::kLongestYaml), "scenario.yaml");
     fuzz::require(std::isfinite(scenario.duration) && std::isfinite(scenario.rate) && scenario.rate > 0.0);
     if (scenario.duration * scenario.rate > kMostRows) {
       return;

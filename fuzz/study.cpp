@@ -31,7 +31,8 @@ std::filesystem::path folder() {
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::filesystem::path beside = folder();
   return fuzz::clean([&] {
-    const results::StudyFile read = results::parse_study(fuzz::text_of(data, size), "study.yaml", beside);
+    const results::StudyFile read =
+        results::parse_study(fuzz::text_of(data, size, fuzz::kLongestYaml), "study.yaml", beside);
     fuzz::require(!read.study.inputs.empty() && !read.study.quantities.empty());
     for (const study::StudyInput& input : read.study.inputs) {
       study::validate(input);

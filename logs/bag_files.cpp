@@ -180,7 +180,7 @@ Parts parts_of(const fs::path& path, bool trust) {
 
 namespace {
 
-constexpr std::size_t longest_metadata = std::size_t{1} << 24;
+constexpr std::size_t longest_metadata = std::size_t{1} << 20;
 constexpr std::size_t most_files = 10'000;
 
 [[noreturn]] void fail(const std::string& name, const YAML::Mark& mark, const std::string& what) {

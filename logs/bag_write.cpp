@@ -53,10 +53,17 @@ struct RosEncoder::Impl {
   /// Bytes of what `fields` puts behind the encapsulation.
   template <typename Fields>
   std::string_view encode(const Fields& fields) {
-    Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
-    cdr.serialize_encapsulation();
-    fields(cdr);
-    return {buffer.getBuffer(), cdr.getSerializedDataLength()};
+    for (;;) {
+      // The library skips what lies between fields for their alignment: it is 0, not what the memory held.
+      const std::size_t size = buffer.getBufferSize();
+      std::fill_n(buffer.getBuffer(), size, '\0');
+      Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
+      cdr.serialize_encapsulation();
+      fields(cdr);
+      if (buffer.getBufferSize() == size) {
+        return {buffer.getBuffer(), cdr.getSerializedDataLength()};
+      }
+    }
   }
 
   /// Of what `fields` puts behind the message's header.

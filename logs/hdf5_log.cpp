@@ -133,11 +133,15 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t
   if (!trust && H5Pget_external_count(how.get()) > 0) {
     return "has its values in another file: expected them in this file, or --trust";
   }
+  const std::size_t width = H5Tget_size(type);
+  if (width == 0) {
+    return "has values of no bytes: expected numbers";
+  }
   hsize_t piece = 0;
-  if (layout == H5D_CHUNKED && (H5Pget_chunk(how.get(), 1, &piece) != 1 || piece > largest_chunk / H5Tget_size(type))) {
+  if (layout == H5D_CHUNKED && (H5Pget_chunk(how.get(), 1, &piece) != 1 || piece > largest_chunk / width)) {
     return fmt::format("is stored in pieces of {} values: expected at most {} bytes in one", piece, largest_chunk);
   }
-  chunk = piece * H5Tget_size(type);
+  chunk = piece * width;
   const Handle file(H5Iget_file_id(dataset), H5Fclose);
   if (!trust && piece > 0 && rows / piece > always_pieces + size_of(file.get()) / bytes_a_piece) {
     return fmt::format(

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/logs/log_file.hpp>
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/error.hpp>
@@ -16,11 +20,38 @@
 
 namespace wheelwright::logs {
 
+namespace {
+
+// Another text when the file, or one of the directory, has been written to or replaced.
+std::string state_of(const std::filesystem::path& path) {
+  std::string state;
+  const auto add = [&](const std::filesystem::path& file) {
+    struct stat now {};
+    if (stat(file.c_str(), &now) == 0) {
+      state += fmt::format("{} {} {} {} {}\n", file.string(), now.st_ino, now.st_size, now.st_mtim.tv_sec,
+                           now.st_mtim.tv_nsec);
+    }
+  };
+  std::error_code none;
+  if (!std::filesystem::is_directory(path, none)) {
+    add(path);
+  }
+  for (auto entry = std::filesystem::directory_iterator(path, none);
+       !none && entry != std::filesystem::directory_iterator(); entry.increment(none)) {
+    add(entry->path());
+  }
+  return state;
+}
+
+}  // namespace
+
 std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& paths, const LogOptions& options) {
   check::that(!paths.empty(), "paths", "at least one file");
   const auto origin = std::make_shared<std::optional<std::int64_t>>();
   std::vector<std::unique_ptr<RowFile>> files;
+  std::vector<std::string> states;
   for (const std::filesystem::path& path : paths) {
+    states.push_back(state_of(path));
     std::error_code ignored;
     const std::filesystem::file_status status = std::filesystem::status(path, ignored);
     if (std::filesystem::is_other(status)) {
@@ -38,7 +69,13 @@ std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& 
       files.push_back(is_hdf5(path) ? hdf5_file(path, options) : csv_file(path, options));
     }
   }
-  return std::make_unique<RowLog>(std::move(files), RowLogOptions{options.block_rows, options.min_rows});
+  auto log = std::make_unique<RowLog>(std::move(files), RowLogOptions{options.block_rows, options.min_rows});
+  for (std::size_t k = 0; k < paths.size(); ++k) {
+    if (state_of(paths[k]) != states[k]) {
+      throw InputError(paths[k].string() + ": was written to while it was read: expected a log that is complete");
+    }
+  }
+  return log;
 }
 
 void check_column_names(const std::vector<std::string>& names) {

@@ -27,8 +27,18 @@ constexpr files::Words<study::RobotStatus, 5> status_words = {{{study::RobotStat
 
 Json maybe(const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); }
 
+// A number of a record; what is computed of one beyond these sizes is none.
+double sized(const JsonPlace& place) {
+  constexpr double largest = 1e100;
+  const double number = place.number();
+  if (std::abs(number) > largest) {
+    place.fail("a number of at most 1e100");
+  }
+  return number;
+}
+
 std::optional<double> maybe(const JsonPlace& object, std::string_view key) {
-  return object.has(key) ? std::optional(object.at(key).number()) : std::nullopt;
+  return object.has(key) ? std::optional(sized(object.at(key))) : std::nullopt;
 }
 
 Json log_json(const study::LogRecord& log) {
@@ -58,25 +68,31 @@ Json log_json(const study::LogRecord& log) {
 
 study::LogRecord log_from(const JsonPlace& at) {
   study::LogRecord log{.log = at.at("log").text(),
-                       .when = at.at("when").number(),
+                       .when = sized(at.at("when")),
                        .status = files::value_of(status_words, at.at("status")),
                        .message = at.at("message").text(),
-                       .seconds = at.at("seconds").number(),
+                       .seconds = sized(at.at("seconds")),
                        .rows = at.at("rows").count()};
   const JsonPlace parameters = at.at("parameters");
   for (std::size_t j = 0; j < parameters.size(); ++j) {
     const JsonPlace p = parameters.at(j);
+    if (const auto error = maybe(p, "standard_error"); error && !(*error == 0.0 || *error >= 1e-100)) {
+      p.at("standard_error").fail("0 or a number >= 1e-100");
+    }
+    if (p.has("freedom") && !(p.at("freedom").number() >= 0.1)) {
+      p.at("freedom").fail("degrees of freedom");
+    }
     log.parameters.push_back({.name = p.at("name").text(),
                               .unit = p.at("unit").text(),
                               .is_prior_key = p.at("is_prior_key").boolean(),
                               .estimate = maybe(p, "estimate"),
                               .standard_error = maybe(p, "standard_error"),
                               .freedom = maybe(p, "freedom"),
-                              .lower = p.at("lower").number(),
-                              .upper = p.at("upper").number(),
+                              .lower = sized(p.at("lower")),
+                              .upper = sized(p.at("upper")),
                               .lower_is_prior = p.at("lower_is_prior").boolean(),
                               .upper_is_prior = p.at("upper_is_prior").boolean(),
-                              .prior = {p.at("prior").at(std::size_t{0}).number(), p.at("prior").at(1).number()},
+                              .prior = {sized(p.at("prior").at(std::size_t{0})), sized(p.at("prior").at(1))},
                               .warrant = robots::warrant_at(p, core::Warrant::extrapolated)});
   }
   return log;

@@ -44,7 +44,13 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
   if (repeats != nullptr && pose == WheelPose::hidden) {
     std::erase_if(*reader.only,
                   [&](const std::string& name) { return std::ranges::count(repeats->columns, name) > 0; });
-    out.log = logs::open_log(paths, reader);
+    auto without_pose = logs::open_log(paths, reader);
+    for (std::size_t k = 0; k < paths.size(); ++k) {
+      if (without_pose->report().files[k].hash != out.log->report().files[k].hash) {
+        throw InputError(paths[k].string() + ": was replaced while it was read: expected a log that is complete");
+      }
+    }
+    out.log = std::move(without_pose);
     out.remarks.push_back(fmt::format("{} It is not used.", repeats->sentence));
   }
   return out;

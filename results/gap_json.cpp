@@ -249,7 +249,11 @@ void take_noise(const files::JsonPlace& root, const Model& model, gap::PlannedNo
   }
   if (floors.size() == model.n()) {
     noise.output = floors;
-    noise.beta = root.at("filter").at("beta").number();
+    const files::JsonPlace beta = root.at("filter").at("beta");
+    noise.beta = beta.number();
+    if (!(noise.beta > 0.0)) {
+      beta.fail("a rate > 0 in 1/s");
+    }
   }
 }
 

@@ -19,7 +19,7 @@ using files::YamlPlace;
 
 namespace {
 
-constexpr std::size_t longest_parameters = std::size_t{1} << 22;
+constexpr std::size_t longest_parameters = std::size_t{1} << 20;
 constexpr std::size_t deepest_group = 8;  // namespaces above a controller, groups below
 constexpr std::size_t most_keys = 20000;  // aliases may multiply a small file
 
@@ -143,6 +143,10 @@ struct ControllerReader {
     if (number && factor) {
       number->value *= factor->value;
       number->place.element += fmt::format(" times {} ({})", factor->place.element, factor->place.where);
+      if (!(number->value > 0.0) || !std::isfinite(number->value)) {
+        throw InputError(fmt::format("{}: {}: {}: expected a finite number > 0", number->place.where,
+                                     number->place.element, number->value));
+      }
     }
   }
 

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <string_view>
 #include <utility>
+#include <variant>
 
 #include <nlohmann/json.hpp>
 
+#include <wheelwright/bounds/polytope.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/detector/pose_sums.hpp>
 #include <wheelwright/detector/scale_detector.hpp>
@@ -119,6 +121,15 @@ filter::ErrorClass error_class_at(const JsonPlace& place) {
   return c;
 }
 
+/// Facets and hull of the set at `place`, which is not empty.
+void take_set(const JsonPlace& place, std::size_t p, std::vector<bounds::HalfSpace>& facets, Box& hull) {
+  facets = facets_at(place, p);
+  hull = box_at(place.at("hull"), p);
+  if (!std::holds_alternative<bounds::Polytope>(bounds::Polytope::intersect(facets, hull))) {
+    place.fail("half-spaces and a hull that have a point in common");
+  }
+}
+
 /// What both residuals say at a stated risk: everything but their errors and usual variances.
 template <typename Risk>
 Risk risk_model_at(const JsonPlace& place, std::size_t p) {
@@ -129,8 +140,7 @@ Risk risk_model_at(const JsonPlace& place, std::size_t p) {
   }
   risk.warrant = warrant_at(place, core::Warrant::guaranteed);
   const JsonPlace set = place.at("feasible_set");
-  risk.facets = facets_at(set, p);
-  risk.box = box_at(set.at("hull"), p);
+  take_set(set, p, risk.facets, risk.box);
   const Eigen::VectorXd scales = vector_at(place.at("scales"));
   if (scales.size() == 0 || !(scales.array() > 0.0).all()) {
     place.at("scales").fail("times > 0 in s");
@@ -325,8 +335,7 @@ std::optional<detector::KinematicModel> kinematic_from_json(const JsonPlace& pla
   model.errors.yaw_gain = bound_at(errors.at("yaw_gain"));
   model.errors.estimated = bounds_at(errors.at("estimated"), n);
   model.persistence = persistence_at(detector.at("persistence"));
-  model.facets = facets_at(set, p);
-  model.box = box_at(set.at("hull"), p);
+  take_set(set, p, model.facets, model.box);
   try {
     static_cast<void>(detector::make_filter(model));
     if (place.has("at_risk")) {
@@ -354,8 +363,7 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
   model.estimate = vector_at(detector.at("estimate"), p);
   model.errors = read_errors(detector.at("error_bounds"), model.model);
   model.persistence = persistence_at(detector.at("persistence"));
-  model.facets = facets_at(root.at("feasible_set"), p);
-  model.box = box_at(root.at("feasible_set").at("hull"), p);
+  take_set(root.at("feasible_set"), p, model.facets, model.box);
   if (root.has("kinematic")) {
     model.kinematic = kinematic_from_json(root.at("kinematic"));
   }

@@ -25,10 +25,11 @@ struct Limit {
 
 void set_limit(RobotWithOrigins& out, const std::string& key, std::vector<Limit> all) {
   std::erase_if(all, [&](const Limit& limit) {
-    if (limit.value == 0.0) {
-      out.remarks.push_back("limits." + key + ": not taken: 0: " + limit.origin);
+    const bool none = !(limit.value > 0.0) || !std::isfinite(limit.value);
+    if (none) {
+      out.remarks.push_back(fmt::format("limits.{}: not taken: {}: {}", key, limit.value, limit.origin));
     }
-    return limit.value == 0.0;
+    return none;
   });
   if (all.empty()) {
     return;

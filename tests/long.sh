@@ -5,12 +5,15 @@
 #   tests/long.sh slow        properties over hundreds of runs
 #   tests/long.sh campaign    the campaign on random robots, five minutes of it
 #   tests/long.sh fuzz [SECONDS]  every fuzzer for a minute, or so long (docs/fuzzing.md)
+#   tests/long.sh mutations [COUNT]  every reader on 100,000 mutations, or so many: slowest input and memory
 #   tests/long.sh endurance   a day at 1 kHz, with trouble every hour (tools/endurance.py, ten minutes)
+#   tests/long.sh faults      kills, full disks, closed streams and the like, 2,000 of them (tools/faults.py, as root)
 #   tests/long.sh sanitizers  all test programs once more under AddressSanitizer and UndefinedBehaviorSanitizer, but for these
 set -eu
 cd "$(dirname "$0")/.."
 jobs=$(nproc 2>/dev/null || echo 2)
 fuzz_seconds=60
+mutations=100000
 slow='(^|/)Slow[A-Z]'
 campaign='^guarantee[.]campaign$'
 tools/setup.sh
@@ -28,6 +31,10 @@ for part in ${*:-slow campaign sanitizers}; do
       tools/build.sh release wheelwright wheelwright-endurance
       tools/endurance.py build
       ;;
+    faults)
+      tools/build.sh release wheelwright
+      tools/faults.py --program build/bin/wheelwright
+      ;;
     sanitizers)
       tools/build.sh asan
       tests/sanitized.py "$jobs"
@@ -37,9 +44,27 @@ for part in ${*:-slow campaign sanitizers}; do
       tools/setup.sh --fuzz
       fuzz/run.sh "$fuzz_seconds"
       ;;
+    mutations)
+      case ${2:-} in [0-9]*) mutations=$2 ;; esac
+      tools/build.sh release test_fuzz
+      folder=${TMPDIR:-/tmp}
+      [ ! -w /dev/shm ] || folder=/dev/shm  # for files of a moment
+      printf '%-12s %9s %10s %9s %7s %9s\n' reader inputs slowest/s bytes MiB findings
+      failed=0
+      for reader in $(build/bin/test_fuzz --gtest_filter='Of/Mutations.*' --gtest_list_tests |
+        sed -n 's|^ *AreReadOrRefused/\([a-z0-9]*\).*|\1|p'); do
+        TMPDIR=$folder WHEELWRIGHT_MUTATIONS=$mutations build/bin/test_fuzz --gtest_brief=1 \
+          --gtest_filter="Of/Mutations.AreReadOrRefused/$reader" > build/mutations.log 2>&1 || {
+          failed=1
+          grep -A2 'Failure$' build/mutations.log >&2 || true
+        }
+        grep "^$reader " build/mutations.log
+      done
+      [ "$failed" = 0 ]
+      ;;
     [0-9]*) ;;
     *)
-      echo "usage: tests/long.sh [slow] [campaign] [endurance] [sanitizers] | fuzz [SECONDS]" >&2
+      echo "usage: tests/long.sh [slow] [campaign] [endurance] [faults] [sanitizers] | fuzz [SECONDS] | mutations [COUNT]" >&2
       exit 2
       ;;
   esac

@@ -95,6 +95,42 @@ TEST_F(Temporaries, OfWritersThatLiveEachKeepsItsOwn) {
   EXPECT_THAT(names(), ::testing::ElementsAre("log.csv"));
 }
 
+// One that failed in the middle left a result without a part of it, and the next run was refused for the rest.
+TEST_F(Temporaries, FilesThatBelongTogetherArePutTogether) {
+  const auto gather = [&] {
+    auto from = std::make_unique<Temporary>(path("gathered"), Temporary::Kind::directory, "it", "room");
+    for (const std::string name : {"page.html", "result.json", "rows.csv"}) {
+      atomic_write(from->path() / name, "new");
+    }
+    return from;
+  };
+  const std::vector<std::string> all = {"page.html", "rows.csv", "result.json"};
+  put("rows.csv", "old");
+  put("extra.yaml", "old");
+  fs::create_directory(path("result.json"));
+  EXPECT_THAT(move_together(gather()->path(), directory_, all, {"extra.yaml"}), HasSubstr("result.json: cannot be"));
+  EXPECT_THAT(names(), ::testing::UnorderedElementsAre("extra.yaml", "rows.csv", "result.json"));
+  EXPECT_EQ(bytes(path("rows.csv")), "old");
+  EXPECT_EQ(bytes(path("extra.yaml")), "old");
+
+  fs::remove(path("result.json"));
+  EXPECT_EQ(move_together(gather()->path(), directory_, all, {"extra.yaml", "none.yaml"}), "");
+  EXPECT_THAT(names(), ::testing::UnorderedElementsAreArray(all));
+  EXPECT_EQ(bytes(path("rows.csv")), "new");
+}
+
+// Where the names of a directory cannot be brought to disk because it may not be read, what was written stands.
+TEST_F(Temporaries, ADirectoryThatMayNotBeReadIsWrittenInto) {
+  fs::create_directory(path("drop"));
+  fs::permissions(path("drop"), fs::perms::owner_write | fs::perms::owner_exec);
+  atomic_write(path("drop/log.csv"), "a log");
+  EXPECT_EQ(bytes(path("drop/log.csv")), "a log");
+  EXPECT_EQ(sync_directory(path("drop")), "");
+  EXPECT_EQ(sync_directory(""), "");
+  EXPECT_NE(sync_directory(path("none")), "");
+  fs::permissions(path("drop"), fs::perms::owner_all);
+}
+
 TEST_F(Temporaries, WhatIsNoFileOfOursIsLeftAlone) {
   fs::create_directory(path("log.csv.wheelwright-part0"));
   put("somewhere", "dear");

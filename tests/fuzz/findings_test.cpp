@@ -1,49 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
-// What fuzzers found once (fuzz/found/NAME/*), handed to them again.
+// What fuzzers found once (fuzz/found/NAME/*) and what they learnt (fuzz/corpus/NAME.gz), handed to them again.
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <map>
-#include <sstream>
+#include <iostream>
+#include <set>
 #include <string>
 
 #include <gtest/gtest.h>
 
-// The fuzzers' entry points, each under a name of its own (tests/CMakeLists.txt).
-using Fuzzer = int(const std::uint8_t* data, std::size_t size);
-extern "C" {
-Fuzzer fuzz_controllers, fuzz_csv, fuzz_db3, fuzz_fleet, fuzz_follow, fuzz_hdf5, fuzz_journal, fuzz_mcap, fuzz_messages,
-    fuzz_metadata, fuzz_model, fuzz_robot, fuzz_scenario, fuzz_study, fuzz_urdf;
-// libFuzzer has it; nothing is mutated here.
-std::size_t LLVMFuzzerMutate(std::uint8_t*, std::size_t size, std::size_t) { return size; }
-}
+#include "fuzz/fuzzers.hpp"
 
 namespace wheelwright::fuzz_test {
 namespace {
 
-const std::map<std::string, Fuzzer*> fuzzers = {
-    {"controllers", fuzz_controllers}, {"csv", fuzz_csv},           {"db3", fuzz_db3},         {"fleet", fuzz_fleet},
-    {"follow", fuzz_follow},           {"hdf5", fuzz_hdf5},         {"journal", fuzz_journal}, {"mcap", fuzz_mcap},
-    {"messages", fuzz_messages},       {"metadata", fuzz_metadata}, {"model", fuzz_model},     {"robot", fuzz_robot},
-    {"scenario", fuzz_scenario},       {"study", fuzz_study},       {"urdf", fuzz_urdf},
-};
+std::set<std::string> stems(const std::filesystem::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    names.insert(entry.path().stem().string());
+  }
+  return names;
+}
 
-// A promise that does not hold ends the program.
 TEST(Findings, MakeAResultThatKeepsItsPromisesOrAnInputError) {
   std::size_t found = 0;
-  for (const auto& folder : std::filesystem::directory_iterator(WHEELWRIGHT_SOURCE_DIR "/fuzz/found")) {
-    Fuzzer* const fuzzer = fuzzers.at(folder.path().filename().string());
-    for (const auto& file : std::filesystem::directory_iterator(folder)) {
-      std::ostringstream read;
-      read << std::ifstream(file.path(), std::ios::binary).rdbuf();
-      const std::string bytes = read.str();
-      std::cout << file.path().string() << std::endl;
-      EXPECT_EQ(fuzzer(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()), 0);
+  for (const auto& [name, fuzzer] : fuzzers) {
+    for (const std::filesystem::path& file : findings_of(name)) {
+      std::cout << file.string() << std::endl;
+      EXPECT_EQ(hand(*fuzzer, bytes_of(file)), 0);
       ++found;
     }
   }
   EXPECT_GT(found, 0U);
+  for (const std::string& name : stems(fuzz_folder() / "found")) {
+    EXPECT_TRUE(fuzzers.contains(name)) << name;
+  }
 }
 
 // Each fuzzer runs, on what every one of them is to stand.
@@ -55,10 +45,38 @@ TEST(Fuzzers, StandNothingAndNoise) {
   for (const auto& [name, fuzzer] : fuzzers) {
     for (const std::string& bytes :
          {std::string(), std::string("\0", 1), std::string("{}"), std::string("a: [1, 2]\n"), noise}) {
-      EXPECT_EQ(fuzzer(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()), 0) << name;
+      EXPECT_EQ(hand(*fuzzer, bytes), 0) << name;
     }
   }
 }
+
+TEST(Corpora, AreThereForEachFuzzerAndSmall) {
+  constexpr std::uintmax_t kMostOfOne = 60 << 10, kMostOfAll = 1 << 20;
+  std::set<std::string> names;
+  std::uintmax_t all = 0;
+  for (const auto& [name, fuzzer] : fuzzers) {
+    const std::uintmax_t bytes = std::filesystem::file_size(fuzz_folder() / "corpus" / (name + ".gz"));
+    EXPECT_LE(bytes, kMostOfOne) << name;
+    all += bytes;
+    names.insert(name);
+  }
+  EXPECT_LE(all, kMostOfAll);
+  EXPECT_EQ(stems(fuzz_folder() / "corpus"), names);
+}
+
+class Corpus : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Corpus, KeepsItsPromises) {
+  std::size_t inputs = 0;
+  for (const std::string& bytes : corpus_of(GetParam())) {
+    EXPECT_EQ(hand(*fuzzers.at(GetParam()), bytes), 0) << "input " << inputs;
+    ++inputs;
+  }
+  EXPECT_GT(inputs, 2U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, Corpus, ::testing::ValuesIn(stems(fuzz_folder() / "corpus")),
+                         [](const auto& test) { return test.param; });
 
 }  // namespace
 }  // namespace wheelwright::fuzz_test

@@ -436,6 +436,18 @@ TEST(RosEncoder, EveryFieldComesBack) {
   EXPECT_THROW(columns_definition({"header"}), InvalidArgument);
 }
 
+// Bytes between fields held what the memory had: recordings of equal messages were not equal.
+TEST(RosEncoder, WhatLiesBetweenFieldsIsZero) {
+  const RosColumns before{{1'000'000'000, std::string(40, 'x')}, std::vector<double>(30, -1.0 / 3.0)};
+  const RosColumns message{{5, "abcd"}, {1.0, 2.0}};
+  RosEncoder used, fresh;
+  EXPECT_EQ(used.encode(before).size(), 4 + 8 + 4 + 41 + 3 + 240u);
+  const std::string bytes(used.encode(message));
+  EXPECT_EQ(bytes, std::string(fresh.encode(message)));
+  // Behind 4 bytes: a stamp of 8, a length of 4 and "abcd" with its end make 17, and doubles begin at 24.
+  EXPECT_EQ(bytes.substr(4 + 17, 7), std::string(7, '\0'));
+}
+
 TEST(RosEncoder, FieldNames) {
   EXPECT_EQ(ros_field_name("rho.lower bound"), "rho_lower_bound");
   EXPECT_EQ(ros_field_name("__Omega__R_"), "omega_r");
