@@ -126,7 +126,7 @@ TEST_F(Robust, AStreamOfWhichNoRowsComeSaysSoAndSaysWhenTheyComeAgain) {
   EXPECT_NEAR(noticed.at("seconds").get<double>(), 5.0, 0.9);
   EXPECT_EQ(noticed.at("since"), over.at("since"));
   EXPECT_NEAR(over.at("until").get<double>(), std::stod(healthy_lines()[2001]), 1e-9);
-  EXPECT_GE(over.at("seconds").get<double>(), 5.9);
+  EXPECT_GE(over.at("seconds").get<double>(), noticed.at("seconds").get<double>());  // less than 6 where it began late
 }
 
 TEST_F(Robust, ALogOfWhichMostCannotBeDecidedIsNotHealthy) {
