@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <iterator>
+#include <deque>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
@@ -118,6 +119,24 @@ std::string command_of(const Arguments& a) {
   return out + " --out DIR";
 }
 
+/// Keys of robots whose files are as they were when a key was first asked for: a result belongs to these. A shard asks for
+/// its own alone. For several threads at once.
+class FirstKeys {
+ public:
+  explicit FirstKeys(const std::vector<robots::FleetListRobot>& robots)
+      : robots_(robots), keys_(robots.size()), asked_(robots.size()) {}
+
+  const std::string& operator()(std::size_t item) {
+    std::call_once(asked_[item], [&] { keys_[item] = robots::key_of(robots_[item]); });
+    return keys_[item];
+  }
+
+ private:
+  const std::vector<robots::FleetListRobot>& robots_;
+  std::vector<std::string> keys_;
+  std::deque<std::once_flag> asked_;
+};
+
 int run(const Arguments& a) {
   make_directory(a.common, {"fleet.json", "fleet.csv", "pooled_prior.yaml"});
   const std::vector<robots::FleetListRobot> robots = robots::read_fleet(a.list);
@@ -130,17 +149,17 @@ int run(const Arguments& a) {
   examine.commission.noise_mode = a.statistical ? filter::NoiseMode::statistical : filter::NoiseMode::worst_case;
   ItemsToRun items;
   items.work.items = robots.size();
-  std::vector<std::string> keys;  // of the files as they are now: a result belongs to these
-  std::ranges::transform(robots, std::back_inserter(keys), robots::key_of);
+  FirstKeys keys(robots);
   items.work.evaluate = [&](std::size_t item) {
+    const std::string& key = keys(item);
     std::string record = results::record_text(study::examine_robot(results::logs_of(robots[item], reading), examine));
-    if (robots::key_of(robots[item]) != keys[item]) {
+    if (robots::key_of(robots[item]) != key) {
       throw InputError(robots[item].name +
                        ": its files were written to while they were read: expected logs that are complete");
     }
     return record;
   };
-  items.key = [&](std::size_t item) { return keys[item]; };
+  items.key = [&](std::size_t item) { return keys(item); };
   items.plan = plan_of(a, own);
   std::optional<Progress> progress(a.common.quiet);
   const ItemsRun run = run_items(items, a.common, a.scale, [&](std::size_t done, std::size_t all) {

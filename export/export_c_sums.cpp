@@ -666,8 +666,9 @@ static inline int pfx_sums_step(pfx_sums *s, double t, const double sample[PFX_I
   text += R"(  pfx_foresee(s, &element);
   pfx_weigh(s, &element);
   pfx_sums_take(s, &element);
-  s->fading = (s->fading + 1) % FADE;
-  if (s->fading == 0) {
+)";
+  text += line("  s->fading = (s->fading + 1) % {};", filter::kFade);
+  text += R"(  if (s->fading == 0) {
     pfx_fade(s->stage, sizeof s->stage);
     pfx_fade(s->g, sizeof s->g);
     pfx_fade(s->g1, sizeof s->g1);
@@ -688,8 +689,6 @@ static inline int pfx_sums_step(pfx_sums *s, double t, const double sample[PFX_I
   return s->looks > 0;
 }
 )";
-  constexpr std::string_view kEvery = "FADE";
-  text.replace(text.find(kEvery), kEvery.size(), fmt::format("{}", filter::kFade));
   return text;
 }
 

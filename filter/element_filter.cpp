@@ -7,6 +7,7 @@
 
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
+#include <wheelwright/filter/in_order.hpp>
 
 namespace wheelwright::filter {
 namespace {
@@ -15,45 +16,9 @@ constexpr double kAlike = 0.05;  // relative: steps alike enough for a parabola 
 
 double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double>(x < 0.0); }
 
-// act(0), ..., act(n - 1); without a loop where n is 2, as for robots on two wheels.
-template <typename Act>
-void each(Eigen::Index n, Act&& act) {
-  if (n == 2) {
-    act(0);
-    act(1);
-    return;
-  }
-  for (Eigen::Index i = 0; i < n; ++i) {
-    act(i);
-  }
-}
-
-// to = matrix · from, with `part` of the matrix's numbers; each sum from the first column to the last: the same digits in
-// every language and build.
-template <typename Part>
-void multiply(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& from, Eigen::VectorXd& to, Part&& part) {
-  const Eigen::Index rows = matrix.rows(), columns = matrix.cols();
-  const double* const m = matrix.data();
-  each(rows, [&](Eigen::Index i) {
-    double sum = part(m[i]) * from[0];
-    if (columns == 2) {
-      sum += part(m[i + rows]) * from[1];
-    } else {
-      for (Eigen::Index j = 1; j < columns; ++j) {
-        sum += part(m[i + j * rows]) * from[j];
-      }
-    }
-    to[i] = sum;
-  });
-}
-
-void multiply(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& from, Eigen::VectorXd& to) {
-  multiply(matrix, from, to, [](double x) { return x; });
-}
-
-// The same with |matrix|.
-void multiply_sizes(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& from, Eigen::VectorXd& to) {
-  multiply(matrix, from, to, [](double x) { return std::abs(x); });
+// result = |matrix| · x.
+void multiply_sizes(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
+  multiply(matrix, x, result, [](double number) { return std::abs(number); });
 }
 
 double cube(double x) { return x * x * x; }
@@ -237,23 +202,16 @@ bool ElementFilter::measure_effort(std::size_t age) {
       low_[j] = high_[j] = now.over[j];
       falling_in_[j] = 0.5 * now.over[j];
     });
-  } else if (!mean) {
+  } else if (!mean || held) {  // of means, the stamp is in the middle of the step
+    const Eigen::VectorXd& begin = mean ? now.over : before.effort;
+    const Eigen::VectorXd& end = mean ? sample(age - 1).over : now.effort;
+    const double near = mean ? 3.0 : 2.0, all = 2.0 * (near + 1.0);
     each(joints, [&](Eigen::Index j) {
-      const double first = before.effort[j], last = now.effort[j];
+      const double first = begin[j], last = end[j];
       low_[j] = std::min(first, last);
       high_[j] = std::max(first, last);
-      falling_in_[j] = (2.0 * first + last) / 6.0;
-      rising_in_[j] = (first + 2.0 * last) / 6.0;
-    });
-    alike = false;
-  } else if (held) {  // the stamp is in the middle of the step
-    const Sample& next = sample(age - 1);
-    each(joints, [&](Eigen::Index j) {
-      const double first = now.over[j], last = next.over[j];
-      low_[j] = std::min(first, last);
-      high_[j] = std::max(first, last);
-      falling_in_[j] = (3.0 * first + last) / 8.0;
-      rising_in_[j] = (first + 3.0 * last) / 8.0;
+      falling_in_[j] = (near * first + last) / all;
+      rising_in_[j] = (first + near * last) / all;
     });
     alike = false;
   } else {

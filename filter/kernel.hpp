@@ -144,10 +144,8 @@ class KernelBank {
  public:
   KernelBank() = default;
   /// `signals` of them, in a segment that has not begun.
-  explicit KernelBank(std::size_t signals)
-      : signals_(signals), rows_((signals + kLane - 1) / kLane * kLane), numbers_(5 * rows_, 0.0) {}
+  explicit KernelBank(std::size_t signals) : rows_((signals + kLane - 1) / kLane * kLane), numbers_(5 * rows_, 0.0) {}
 
-  [[nodiscard]] std::size_t signals() const { return signals_; }
   /// `signals` each; what was written to in() stays there.
   [[nodiscard]] double* in() { return numbers_.data(); }
   [[nodiscard]] double* out() { return numbers_.data() + rows_; }
@@ -168,7 +166,7 @@ class KernelBank {
   friend class FilterKernel;
   static constexpr std::size_t kLane = 4;  // that are worked on without looking whether there are as many
 
-  std::size_t signals_ = 0, rows_ = 0;
+  std::size_t rows_ = 0;
   std::vector<double> numbers_;
 };
 

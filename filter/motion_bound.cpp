@@ -10,6 +10,7 @@
 #include <wheelwright/core/check.hpp>
 #include <wheelwright/core/limits.hpp>
 #include <wheelwright/core/linear_algebra.hpp>
+#include <wheelwright/filter/in_order.hpp>
 
 namespace wheelwright::filter {
 namespace {
@@ -18,17 +19,6 @@ constexpr double kUp = 1.0 + 64.0 * core::kEpsilon;  // above the rounding of a 
 constexpr int kRounds = 12;                          // of functions that grow with the speed
 
 using Intervals = std::vector<std::vector<Interval>>;
-
-// result = matrix · x, each sum from the first column to the last: the same digits in every language and build.
-void multiply_in_order(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    double sum = matrix(i, 0) * x[0];
-    for (Eigen::Index j = 1; j < matrix.cols(); ++j) {
-      sum += matrix(i, j) * x[j];
-    }
-    result[i] = sum;
-  }
-}
 
 bool holds_zero(const Interval& x) { return x.lower <= 0.0 && x.upper >= 0.0; }
 
@@ -142,7 +132,7 @@ StepEnclosure::StepEnclosure(const Model& model, MotionBound bound) : bound_(std
     rate_.resize(coordinates, coordinates);
     Eigen::VectorXd column(coordinates);
     for (Eigen::Index d = 0; d < coordinates; ++d) {
-      multiply_in_order(bound_.mobility, friction.col(d), column);
+      multiply(bound_.mobility, friction.col(d), column);
       rate_.col(d) = kUp * column;
     }
   }
@@ -226,7 +216,7 @@ bool StepEnclosure::enclose(const Model& model, StepMotion& step) const {
     const auto rows = rate_.rows();
     const auto solve = [&]() {
       force(model, step);
-      multiply_in_order(bound_.mobility, force_, next_);
+      multiply(bound_.mobility, force_, next_);
       if (rows == 1) {
         const double left = 1.0 - half * rate_(0, 0);
         if (!(left > 0.0)) return false;

@@ -7,21 +7,10 @@
 
 using namespace wheelwright;
 
-namespace {
-
-std::filesystem::path folder() {
-  const std::filesystem::path made = fuzz::on_disk("", ".bag");
-  std::filesystem::remove(made);
-  std::filesystem::create_directory(made);
-  return made;
-}
-
-}  // namespace
-
 // A folder as rosbag2 records it: metadata.yaml and, behind a zero byte, its file, which may be packed as a whole or
 // message by message. What is read of it is clean, and the same a second time.
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const std::filesystem::path bag = folder();
+  static const std::filesystem::path bag = fuzz::folder_on_disk(".bag");
   const std::string_view input = fuzz::text_of(data, size);
   const std::size_t end = std::min(input.find('\0'), input.size());
   const auto put = [](const std::filesystem::path& path, std::string_view bytes) {

@@ -89,6 +89,14 @@ inline std::filesystem::path on_disk(std::string_view bytes, const std::string& 
   return path;
 }
 
+/// A folder of this process with that ending, which is empty. It is removed when the process ends.
+inline std::filesystem::path folder_on_disk(const std::string& ending) {
+  const std::filesystem::path made = on_disk("", ending);
+  std::filesystem::remove(made);
+  std::filesystem::create_directory(made);
+  return made;
+}
+
 }  // namespace wheelwright::fuzz
 
 /// libFuzzer's entry point.

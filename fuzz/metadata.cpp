@@ -12,9 +12,8 @@ namespace {
 
 /// A folder as a recorder leaves it: two files that are there, and one beside it that nothing may reach.
 std::filesystem::path folder() {
-  const std::filesystem::path outside = fuzz::on_disk("", ".metadata");
-  std::filesystem::remove(outside);
-  std::filesystem::create_directories(outside / "bag");
+  const std::filesystem::path outside = fuzz::folder_on_disk(".metadata");
+  std::filesystem::create_directory(outside / "bag");
   for (const char* const name : {"bag/a_0.mcap", "bag/a_1.mcap", "secret.mcap"}) {
     std::ofstream(outside / name) << "MCAP";
   }

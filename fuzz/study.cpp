@@ -12,9 +12,7 @@ namespace {
 
 /// A folder with a scenario of half a second, which a study may name.
 std::filesystem::path folder() {
-  const std::filesystem::path made = fuzz::on_disk("", ".study");
-  std::filesystem::remove(made);
-  std::filesystem::create_directory(made);
+  const std::filesystem::path made = fuzz::folder_on_disk(".study");
   std::ofstream(made / "scenario.yaml")
       << "robot: {model: differential_drive, wheel_radius: 0.1, track_width: 0.4, effort: {kind: torque, hold: "
          "zero_order}, prior: {mass: [5, 60]}, noise: {wheel_speed: 0.02, effort: 0.02}, filter: {order: 2, alpha: 20, "
