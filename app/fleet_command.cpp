@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -123,18 +122,20 @@ std::string command_of(const Arguments& a) {
 /// its own alone. For several threads at once.
 class FirstKeys {
  public:
-  explicit FirstKeys(const std::vector<robots::FleetListRobot>& robots)
-      : robots_(robots), keys_(robots.size()), asked_(robots.size()) {}
+  explicit FirstKeys(const std::vector<robots::FleetListRobot>& robots) : robots_(robots), keys_(robots.size()) {}
 
   const std::string& operator()(std::size_t item) {
-    std::call_once(asked_[item], [&] { keys_[item] = robots::key_of(robots_[item]); });
+    const std::scoped_lock guard(mutex_);
+    if (keys_[item].empty()) {
+      keys_[item] = robots::key_of(robots_[item]);
+    }
     return keys_[item];
   }
 
  private:
   const std::vector<robots::FleetListRobot>& robots_;
+  std::mutex mutex_;
   std::vector<std::string> keys_;
-  std::deque<std::once_flag> asked_;
 };
 
 int run(const Arguments& a) {
