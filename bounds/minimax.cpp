@@ -18,8 +18,9 @@ namespace wheelwright::bounds {
 namespace {
 
 constexpr std::size_t kScanned = 1 << 14;
-constexpr std::size_t kSmall = 64;  // rows that are not worth a store of their own
-constexpr double kAside = 1e-6;     // of γ: room for rounding below which a row is not put aside
+constexpr std::size_t kAtOnce = 256;  // rows of a sample
+constexpr std::size_t kSmall = 64;    // rows that are not worth a store of their own
+constexpr double kAside = 1e-6;       // of γ: room for rounding below which a row is not put aside
 
 /// γ that row `row` asks for at θ, a bound on the rounding of it, and what it asks for without dy and dY.
 struct Demand {
@@ -55,16 +56,24 @@ class Epigraph {
     coordinates_.centre = theta_;
     // z and γ are scaled so that both take part in a row alike.
     double steepest = 0.0, size = 0.0;
-    Eigen::VectorXd Y(p);
+    Eigen::MatrixXd Y, at;
+    Eigen::VectorXd y, left;
     for (const SlabColumns& rows : sample) {
       const double w = weights_[rows.output];
-      for (std::size_t r = 0; std::isfinite(w) && r < rows.n; ++r) {
+      for (std::size_t first = 0; std::isfinite(w) && first < rows.n; first += kAtOnce) {
+        const auto count = static_cast<Eigen::Index>(std::min(kAtOnce, rows.n - first));
+        Y.resize(count, p);
         for (Eigen::Index j = 0; j < p; ++j) {
-          Y[j] = rows.Y[static_cast<std::size_t>(j)][r];
+          Y.col(j) = Eigen::Map<const Eigen::VectorXd>(rows.Y[static_cast<std::size_t>(j)] + first, count);
         }
-        scale_ = std::max(scale_, demand(rows, r, theta_, w).residual);
-        steepest = std::max(steepest, (T.transpose() * Y).norm() / w);
-        size = std::max(size, (std::abs(rows.y[r]) + rows.dy[r]) / w);
+        y = Eigen::Map<const Eigen::VectorXd>(rows.y + first, count);
+        left = y;
+        left.noalias() -= Y * theta_;
+        at.noalias() = Y * T;
+        scale_ = std::max(scale_, left.lpNorm<Eigen::Infinity>() / w);
+        steepest = std::max(steepest, std::sqrt(at.rowwise().squaredNorm().maxCoeff()) / w);
+        size =
+            std::max(size, (y.cwiseAbs() + Eigen::Map<const Eigen::VectorXd>(rows.dy + first, count)).maxCoeff() / w);
       }
     }
     scale_ = std::max({scale_, 1e-13 * size, 1e-200});
@@ -309,53 +318,81 @@ MinimaxFit fit(core::RegressionSource& source, const RowSurvey& survey, const Bo
   return finished(epigraph, std::move(result), options.tolerance);
 }
 
+/// Rows [first, first + count), of which those are put aside that can matter for any θ within `half` of `centre`.
+struct Look {
+  std::size_t first = 0, count = 0;
+  Eigen::VectorXd centre, half;
+
+  [[nodiscard]] bool holds(const Eigen::VectorXd& theta) const {
+    return ((theta - centre).cwiseAbs().array() <= half.array()).all();
+  }
+};
+
 MinimaxFit fit(const SlabColumns& rows, const Box& prior, const std::vector<double>& weights,
                const MinimaxOptions& options) {
   const double w = weights[rows.output];
   const SpreadSample sample(rows);
   const Eigen::MatrixXd information = sample.information(prior);
-  Epigraph epigraph(prior, weights, information, sample.estimate(prior), {sample.all()});
+  Epigraph epigraph(prior, weights, information, sample.estimate(prior, information), {sample.all()});
   std::vector<Eigen::VectorXd> fits;
   sample.each_level([&](const SlabColumns& level) {
     epigraph.absorb(level, options.tolerance);
     fits.push_back(epigraph.theta());
     return true;
   });
+  // Each look is as long as all before it: what it brings moves the fit about half as far as the look before.
   Eigen::VectorXd half = 2.0 * (fits[2] - fits[1]).cwiseAbs() + 0.5 * (fits[1] - fits[0]).cwiseAbs();
-  MinimaxFit result;
-  result.upper = std::numeric_limits<double>::infinity();
+  std::vector<Look> looks;
+  for (std::size_t first = 0; first < rows.n; first += looks.back().count) {
+    looks.push_back({first, std::min(std::max(first, kScanned), rows.n - first), {}, {}});
+  }
+  SlabStore aside;
   std::vector<double> peaks(rows.parameters() + 1);
-  while (result.passes < options.pass_limit && !epigraph.failed()) {
-    const Eigen::VectorXd centre = epigraph.theta();
-    const double floor = (1.0 - kAside) * epigraph.gamma();
-    SlabStore aside;
-    std::fill(peaks.begin(), peaks.end(), 0.0);
-    for (std::size_t first = 0; first < rows.n; first += kScanned) {
-      const SlabColumns portion = rows.part(first, std::min(kScanned, rows.n - first));
-      aside.append(portion, epigraph.beyond(portion, centre, half, floor * w, peaks.data()));
+  double floor = 0.0;  // no row that is not aside asks for more where all looks hold, but for rounding
+  const auto look_at = [&](Look& look) {
+    look.centre = epigraph.theta();
+    look.half = half;
+    const double least = (1.0 - kAside) * epigraph.gamma();
+    floor = std::max(floor, least);
+    for (std::size_t first = look.first; first < look.first + look.count; first += kScanned) {
+      const SlabColumns portion = rows.part(first, std::min(kScanned, look.first + look.count - first));
+      aside.append(portion, epigraph.beyond(portion, look.centre, look.half, least * w, peaks.data()));
     }
-    const SlabColumns near = aside.view();
+    epigraph.absorb(aside.view(), options.tolerance);
+    return (epigraph.theta() - look.centre).cwiseAbs().eval();
+  };
+  for (Look& look : looks) {
+    half = (0.5 * half).cwiseMax(4.0 * look_at(look));
+  }
+  MinimaxFit result;
+  result.passes = 1;
+  const auto holds = [&](const Look& look) { return look.holds(epigraph.theta()); };
+  bool settled = std::ranges::all_of(looks, holds);
+  while (!settled && result.passes < options.pass_limit && !epigraph.failed()) {
+    for (Look& look : looks) {
+      if (!holds(look)) {
+        half = (2.0 * look.half).cwiseMax(4.0 * (epigraph.theta() - look.centre).cwiseAbs());
+        look_at(look);
+      }
+    }
     ++result.passes;
-    epigraph.absorb(near, options.tolerance);
-    const Eigen::VectorXd theta = epigraph.theta();
-    if (!((theta - centre).cwiseAbs().array() <= half.array()).all()) {
-      half = half.cwiseMax(4.0 * (theta - centre).cwiseAbs());
-      continue;
-    }
-    // Rows that are not near ask for less than `floor` anywhere in the box, but for rounding.
+    settled = std::ranges::all_of(looks, holds);
+  }
+  const Eigen::VectorXd theta = epigraph.theta();
+  result.theta.assign(theta.data(), theta.data() + theta.size());
+  if (settled) {
     double magnitude = peaks.back() + floor * w;
     for (Eigen::Index j = 0; j < theta.size(); ++j) {
-      magnitude += 2.0 * peaks[static_cast<std::size_t>(j)] * (std::abs(centre[j]) + 2.0 * half[j]);
+      double reach = 0.0;
+      for (const Look& look : looks) {
+        reach = std::max(reach, std::abs(look.centre[j]) + 2.0 * look.half[j]);
+      }
+      magnitude += 2.0 * peaks[static_cast<std::size_t>(j)] * reach;
     }
     const double doubt = 8.0 * static_cast<double>(theta.size() + 4) * core::kEpsilon * magnitude / w;
-    result.upper = std::max(largest_demand(near, theta, w), core::round_up(floor + doubt));
-    result.theta.assign(theta.data(), theta.data() + theta.size());
-    break;
-  }
-  if (!std::isfinite(result.upper)) {
-    const Eigen::VectorXd theta = epigraph.theta();
+    result.upper = std::max(largest_demand(aside.view(), theta, w), core::round_up(floor + doubt));
+  } else {
     result.upper = largest_demand(rows, theta, w);
-    result.theta.assign(theta.data(), theta.data() + theta.size());
     ++result.passes;
   }
   return finished(epigraph, std::move(result), options.tolerance);

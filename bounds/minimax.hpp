@@ -26,7 +26,7 @@ struct MinimaxFit {
   double upper = 0.0;               ///< what `theta` reaches over all rows, rounded outward
   std::vector<double> theta;        ///< p parameters in the prior box, with which `upper` is reached
   std::vector<WeightedRow> active;  ///< rows a·θ − wγ <= b (last coefficient −w) and multipliers that prove `lower`
-  std::size_t passes = 0;           ///< passes over the source
+  std::size_t passes = 0;           ///< passes over the source, or parts of it once more
   bool converged = false;           ///< the bracket is as narrow as the tolerance asks, or as double precision allows
 };
 
@@ -41,8 +41,9 @@ struct MinimaxFit {
                                      const MinimaxOptions& options = {});
 
 /// The same for rows of one output in memory (γ* in units of `weights`, one number, or of 1), usually in one pass: the
-/// fit of an evenly spread sample comes first; of all rows, those are put aside that can matter for any θ in a box
-/// around it, and the fit of these is the fit of all when it lies in the box (else the box is made wider).
+/// fit of an evenly spread sample comes first; then the rows in looks, each as long as all before it: those are put aside
+/// that can matter for any θ in a box around the fit of all before, and the last fit is that of all rows when it lies in
+/// every look's box (where it does not, that look is taken again with a wider one).
 [[nodiscard]] MinimaxFit minimax_fit(const SlabColumns& rows, const Box& prior, const MinimaxOptions& options = {});
 
 }  // namespace wheelwright::bounds

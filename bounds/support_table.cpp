@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/bounds/support_table.hpp>
-#include <wheelwright/core/limits.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include <wheelwright/bounds/known_size.hpp>
+#include <wheelwright/core/limits.hpp>
 
 namespace wheelwright::bounds {
 
 std::optional<SupportTable> SupportTable::make(const Polytope& set, const SupportTableOptions& options) {
   check::that(options.slots > 0 && options.vertices >= 2, "support table", "at least one slot and two vertices");
   SupportTable table(set, options);
+  std::vector<VertexGraph> graphs;
   std::size_t largest = 0;
   std::optional<SupportWalk> walk;
   for (std::size_t b = 0; b < set.blocks().size(); ++b) {
@@ -31,9 +34,10 @@ std::optional<SupportTable> SupportTable::make(const Polytope& set, const Suppor
       return std::nullopt;
     }
     largest = std::max(largest, block.parameters.size());
-    table.graphs_.push_back(*std::move(graph));
+    graphs.push_back(*std::move(graph));
   }
-  table.places_.assign(table.graphs_.size() * options.slots, 0);
+  table.places_.assign(graphs.size() * options.slots, 0);
+  table.graphs_ = std::make_shared<const std::vector<VertexGraph>>(std::move(graphs));
   table.a_.resize(largest);
   table.mu_.resize(largest);
   return table;
@@ -48,11 +52,14 @@ struct Sum {
 };
 
 // From the vertex at `place` along edges to the best one for `direction`, at most `budget` of them. Q is the block's number
-// of parameters, or 0 where that is known to `graph` alone; `mu` has room for it.
+// of parameters, or 0 where that is known to `graph` alone: then `room_a` and `room_mu` have room for it.
 template <std::size_t Q>
-void follow(const VertexGraph& graph, const double* direction, std::uint32_t& place, std::size_t budget, double* a,
-            double* mu, Sum& h) {
+void follow(const VertexGraph& graph, const double* direction, std::uint32_t& place, std::size_t budget, double* room_a,
+            double* room_mu, Sum& h) {
   const std::size_t q = Q > 0 ? Q : graph.parameters.size(), stride = q * q + 4 * q;
+  double held_a[Q > 0 ? Q : 1], held_mu[Q > 0 ? Q : 1];
+  double* const a = Q > 0 ? held_a : room_a;
+  double* const mu = Q > 0 ? held_mu : room_mu;
   double size = 0.0, sum = 0.0, product = 0.0;
   for (std::size_t k = 0; k < q; ++k) {
     a[k] = direction[graph.parameters[k]];
@@ -103,13 +110,6 @@ void follow(const VertexGraph& graph, const double* direction, std::uint32_t& pl
   h.magnitude += std::abs(product);
 }
 
-// With room of its own, in registers.
-template <std::size_t Q>
-void follow(const VertexGraph& graph, const double* direction, std::uint32_t& place, std::size_t budget, Sum& h) {
-  double a[Q], mu[Q];
-  follow<Q>(graph, direction, place, budget, a, mu, h);
-}
-
 }  // namespace
 
 double SupportTable::support(std::span<const double> a, std::size_t slot) noexcept {
@@ -120,19 +120,12 @@ double SupportTable::support(std::span<const double> a, std::size_t slot) noexce
     h.value += product;
     h.magnitude += std::abs(product);
   }
-  for (std::size_t g = 0; g < graphs_.size(); ++g) {
+  for (std::size_t g = 0; g < graphs_->size(); ++g) {
     std::uint32_t& place = places_[g * options_.slots + slot];
-    const VertexGraph& graph = graphs_[g];
-    switch (graph.parameters.size()) {
-      case 2: follow<2>(graph, a.data(), place, options_.budget, h); break;
-      case 3: follow<3>(graph, a.data(), place, options_.budget, h); break;
-      case 4: follow<4>(graph, a.data(), place, options_.budget, h); break;
-      case 5: follow<5>(graph, a.data(), place, options_.budget, h); break;
-      case 6: follow<6>(graph, a.data(), place, options_.budget, h); break;
-      case 7: follow<7>(graph, a.data(), place, options_.budget, h); break;
-      case 8: follow<8>(graph, a.data(), place, options_.budget, h); break;
-      default: follow<0>(graph, a.data(), place, options_.budget, a_.data(), mu_.data(), h);
-    }
+    const VertexGraph& graph = (*graphs_)[g];
+    with_known_size(graph.parameters.size(), [&](auto known) {
+      follow<known()>(graph, a.data(), place, options_.budget, a_.data(), mu_.data(), h);
+    });
   }
   edges_ += h.edges;
   // ε covers the rounding of μ and of a·v. What is left: sums of at most p numbers >= 0 (slack), and of at most p

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -33,7 +34,7 @@ struct SupportTableOptions {
 /// which is SupportWalk's bound and holds wherever the walk ends: a budget that runs out costs tightness, never the
 /// guarantee. A query is a fixed sequence of additions, multiplications and comparisons, without fused multiply-add, so
 /// that the same numbers in another language give the same digits. Nothing is allocated after construction. One object
-/// serves one thread.
+/// serves one thread; its copies share the vertices.
 class SupportTable {
  public:
   /// For `set`, whose data are shared. Nothing where a block has more vertices than options.vertices, or its edges
@@ -50,7 +51,7 @@ class SupportTable {
   /// Blocks of one parameter, of which the hull says all.
   [[nodiscard]] const std::vector<std::size_t>& singles() const noexcept { return singles_; }
   /// The other blocks.
-  [[nodiscard]] const std::vector<VertexGraph>& graphs() const noexcept { return graphs_; }
+  [[nodiscard]] const std::vector<VertexGraph>& graphs() const noexcept { return *graphs_; }
   /// Edges that were walked so far.
   [[nodiscard]] std::size_t edges() const noexcept { return edges_; }
 
@@ -63,7 +64,7 @@ class SupportTable {
   Polytope set_;
   SupportTableOptions options_;
   std::vector<std::size_t> singles_;
-  std::vector<VertexGraph> graphs_;
+  std::shared_ptr<const std::vector<VertexGraph>> graphs_;
   std::vector<std::uint32_t> places_;  // graphs × slots
   std::vector<double> a_, mu_;         // room for the largest block
   std::size_t edges_ = 0;

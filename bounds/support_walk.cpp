@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include <wheelwright/bounds/known_size.hpp>
 #include <wheelwright/bounds/linear_program.hpp>
 #include <wheelwright/core/limits.hpp>
 
@@ -195,11 +196,13 @@ void SupportWalk::refine(const Vertex& v, std::size_t q, const double* facets, d
 
 /// All that follows from the inverse: M, v, ε, …. How many times larger I − AᵀM is than rounding alone would make it;
 /// not finite where anything is not.
+template <std::size_t Q>
 double SupportWalk::enclose(Walk& walk, const Vertex& v, const std::int32_t* basis) noexcept {
-  const std::size_t q = walk.q;
+  const std::size_t q = Q > 0 ? Q : walk.q;
   const double gamma = rounding(q);
-  double* sum = walk.mu.data();
-  double* size = walk.direction.data();
+  double held_sum[Q > 0 ? Q : 1], held_size[Q > 0 ? Q : 1];
+  double* const sum = Q > 0 ? held_sum : walk.mu.data();
+  double* const size = Q > 0 ? held_size : walk.direction.data();
   std::fill(v.place, v.place + q, 0.0);
   for (std::size_t r = 0; r < q; ++r) {
     const auto facet = static_cast<std::size_t>(basis[r]);
@@ -310,10 +313,13 @@ bool SupportWalk::make(Walk& walk, const std::int32_t* basis, const double* inve
   }
   // A neighbour's inverse with one facet exchanged is nearly always as good as a fresh one; where it is not, it is
   // refined once.
-  double worse = enclose(walk, v, basis);
+  const auto enclosed = [&] {
+    return with_known_size(q, [&](auto known) { return enclose<known()>(walk, v, basis); });
+  };
+  double worse = enclosed();
   if (!(worse <= kAsNew)) {
     refine(v, q, facets, rest, walk.scratch.data() + 2 * q * q);
-    worse = enclose(walk, v, basis);
+    worse = enclosed();
   }
   const bool finite = std::isfinite(worse);
   if (!finite) {
@@ -405,10 +411,12 @@ bool SupportWalk::forget(Walk& walk, const std::int32_t* basis) noexcept {
   return make(walk, walk.wanted.data(), nullptr);
 }
 
+template <std::size_t Q>
 double SupportWalk::follow(Walk& walk, Place& place, double size) noexcept {
-  const std::size_t q = walk.q;
+  const std::size_t q = Q > 0 ? Q : walk.q;
   const double* a = walk.a.data();
-  double* mu = walk.mu.data();
+  double held_mu[Q > 0 ? Q : 1];
+  double* const mu = Q > 0 ? held_mu : walk.mu.data();
   if (place.generation != walk.generation) {
     place.vertex = find(walk, place.basis.data());
     if (place.vertex == kNone) {
@@ -529,7 +537,7 @@ double SupportWalk::support(std::span<const double> a, std::size_t slot) noexcep
         continue;
       }
       ++count_.directions;
-      bound = follow(walk, walk.places[slot], size);
+      bound = with_known_size(walk.q, [&](auto known) { return follow<known()>(walk, walk.places[slot], size); });
     } else {
       bound = support_of_vertices(set_.blocks()[i], set_.hull(), a);
     }

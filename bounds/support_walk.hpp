@@ -121,12 +121,15 @@ class SupportWalk {
 
   [[nodiscard]] static Vertex parts(double* first, std::size_t q) noexcept;
   static void refine(const Vertex& v, std::size_t q, const double* facets, double* rest, double* refined) noexcept;
+  // Q is the block's number of parameters, or 0 where that is known to `walk` alone.
+  template <std::size_t Q>
   [[nodiscard]] static double enclose(Walk& walk, const Vertex& v, const std::int32_t* basis) noexcept;
   bool begin(Walk& walk, const Polytope::Block& block, const SupportWalkOptions& options);
   [[nodiscard]] static std::uint32_t find(Walk& walk, const std::int32_t* basis) noexcept;
   [[nodiscard]] static bool make(Walk& walk, const std::int32_t* basis, const double* inverse) noexcept;
   [[nodiscard]] static bool forget(Walk& walk, const std::int32_t* basis) noexcept;
   [[nodiscard]] std::uint32_t step(Walk& walk, std::uint32_t from, std::size_t leaving) noexcept;
+  template <std::size_t Q>
   [[nodiscard]] double follow(Walk& walk, Place& place, double size) noexcept;
 
   Polytope set_;

@@ -109,12 +109,12 @@ Eigen::MatrixXd SpreadSample::information(const Box& prior) const {
   return sum;
 }
 
-Eigen::VectorXd SpreadSample::estimate(const Box& prior) const {
+Eigen::VectorXd SpreadSample::estimate(const Box& prior, const Eigen::MatrixXd& information) const {
   const auto p = static_cast<Eigen::Index>(all().parameters());
   const auto n = static_cast<Eigen::Index>(all().n);
   const Eigen::Map<const Eigen::MatrixXd> Y(memory_.get(), n, p);
   const Eigen::VectorXd weight = weights(prior).cwiseAbs2();
-  const Coordinates at = whitened(prior, information(prior));
+  const Coordinates at = whitened(prior, information);
   const Eigen::VectorXd rest = Eigen::Map<const Eigen::VectorXd>(all().y, n) - Y * at.centre;
   return at.centre + at.transform * (at.transform.transpose() * (Y.transpose() * weight.cwiseProduct(rest)));
 }

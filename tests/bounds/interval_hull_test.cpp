@@ -200,5 +200,52 @@ TEST(MinimaxInMemory, ClosedFormsAndTheSource) {
   }
 }
 
+// Looks at early rows are taken with small boxes around fits that know nothing of what comes.
+TEST(MinimaxInMemory, RowsThatDecideComeLateOrSeldom) {
+  constexpr std::size_t n = 100000;
+  for (const bool noisy : {false, true}) {
+    for (const std::size_t at : {std::size_t{3}, std::size_t{20001}, n / 2, n - 2, n}) {
+      Rows rows = slow_rows(9, 4, n, noisy);
+      RegressionBlock block = rows.block(0, n);
+      block.dy.setZero();
+      for (Eigen::Index i = 0; i < block.y.size(); ++i) {
+        const auto row = static_cast<std::size_t>(i);
+        if (at == n ? row > n - n / 10 : row == at) {
+          block.y[i] += at == n ? 5.0 * block.Y(i, 1) : 30.0;  // another robot at the end, or one row far off
+        }
+      }
+      core::RegressionTable table(block);
+      const MinimaxFit source = minimax_fit(table, positive(4)), memory = minimax_fit(Columns(block).view, positive(4));
+      ASSERT_TRUE(source.converged && memory.converged) << at;
+      EXPECT_LE(std::max(source.lower, memory.lower), std::min(source.upper, memory.upper)) << at;
+      double asked = 0.0;
+      for (Eigen::Index i = 0; i < block.y.size(); ++i) {
+        double left = block.y[i], allowed = 0.0;
+        for (Eigen::Index j = 0; j < 4; ++j) {
+          left -= block.Y(i, j) * memory.theta[static_cast<std::size_t>(j)];
+          allowed += block.dY(i, j) * std::abs(memory.theta[static_cast<std::size_t>(j)]);
+        }
+        asked = std::max(asked, std::abs(left) - allowed);
+      }
+      EXPECT_LE(asked, memory.upper * (1.0 + 1e-12)) << at;
+      EXPECT_GE(asked, memory.upper * (1.0 - 1e-6)) << at;
+    }
+  }
+}
+
+TEST(MinimaxInMemory, HoldsWhateverThePassesThatAreAllowed) {
+  Rows rows = slow_rows(10, 4, 60000, false);
+  RegressionBlock block = rows.block(0, 60000);
+  block.dy.setZero();
+  block.y[59990] += 40.0;
+  const Columns columns(block);
+  const MinimaxFit full = minimax_fit(columns.view, positive(4));
+  MinimaxOptions options;
+  options.pass_limit = 1;
+  const MinimaxFit one = minimax_fit(columns.view, positive(4), options);
+  EXPECT_LE(one.lower, full.upper);
+  EXPECT_GE(one.upper, full.lower);
+}
+
 }  // namespace
 }  // namespace wheelwright::bounds::interval_hull_test

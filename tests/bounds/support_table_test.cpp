@@ -2,6 +2,7 @@
 // The table of all vertices: never below the exact support, equal to it where the budget lasts, sublinear,
 // within its budget.
 #include <cmath>
+#include <memory>
 
 #include <gtest/gtest.h>
 
@@ -156,6 +157,20 @@ TEST(SupportTable, DoesNotDependOnWhatWasAskedBefore) {
   for (std::size_t k = 300; k-- > 0;) {
     EXPECT_NEAR(backwards.support(direction(40 * k, 4)), answers[k], 1e-11 * (1.0 + std::abs(answers[k])));
   }
+}
+
+TEST(SupportTable, CopiesShareTheirVerticesAndNothingElse) {
+  const Polytope set(half_spaces(8, 4, 40, false), cube(4, 4.0));
+  auto first = std::make_unique<SupportTable>(table_of(set));
+  SupportTable second = *first, alone = table_of(set);
+  EXPECT_EQ(&first->graphs(), &second.graphs());
+  for (std::size_t k = 0; k < 300; ++k) {
+    static_cast<void>(first->support(direction(7 * k + 3, 4)));
+    const double expected = alone.support(direction(40 * k, 4));
+    EXPECT_EQ(second.support(direction(40 * k, 4)), expected);
+  }
+  first.reset();
+  EXPECT_EQ(second.support(direction(1, 4)), alone.support(direction(1, 4)));
 }
 
 TEST(SupportTable, KeepsItsBudgetAndIsThenNoWorseThanTheHull) {
