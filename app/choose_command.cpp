@@ -84,16 +84,16 @@ int run(const Arguments& a) {
   }
   const Json json = results::to_json(choice, a.robot.string(), logs, results::software());
   if (!a.common.out.empty()) {
+    CommonOptions files = a.common;
+    files.json = false;
     if (choice.chosen) {
-      CommonOptions files = a.common;
-      files.json = false;
       report::ReportContext context = report_context(a.common, log.report(), log);
       context.seen = commission::first_look(log, choice.chosen->model, options.trial.threads);
       files::write_json(gathered(a.common) / "choice.json", json);
       publish(files, results::to_json(*choice.chosen, log.report(), results::software()), "model.json",
               report::choice_report(choice, context));
     } else {
-      files::write_json(a.common.out / "choice.json", json);
+      publish(files, json, "choice.json", "");
     }
   }
   if (a.common.json) {

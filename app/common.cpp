@@ -225,23 +225,28 @@ void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesy
   }
 }
 
-void make_directory(const CommonOptions& options, const std::vector<std::string>& files) {
-  if (options.out.empty()) {
-    return;
-  }
-  std::vector<std::string> names = files;
-  if (!names.empty()) {
-    names.emplace_back(kPage);
-  }
-  for (const std::string& name : names) {
-    if (const std::filesystem::path place = options.out / name; is_there(place) && !options.force) {
-      if (const std::string other = whose(options, files.front(), name); !other.empty()) {
-        throw InputError(fmt::format("{}: is there already, {}: expected another --out, or --force to replace it",
-                                     place.string(), other));
-      }
-    }
-  }
-  const std::lock_guard<std::mutex> lock(made_mutex());
+namespace {
+
+// A directory that results go into.
+struct ResultPlace {
+  std::filesystem::path out;
+  std::string result;             // name of the command's result
+  std::vector<std::string> left;  // names of what an earlier run of the command left
+  std::unique_ptr<files::DirectoryLock> lock;
+};
+
+std::vector<ResultPlace>& result_places() {
+  static std::vector<ResultPlace> all;
+  return all;
+}
+
+// Null where it was not made by make_directory() with names of results.
+ResultPlace* place_of(const CommonOptions& options) {
+  const auto place = std::ranges::find(result_places(), options.out, &ResultPlace::out);
+  return place == result_places().end() ? nullptr : &*place;
+}
+
+void create_out(const CommonOptions& options) {
   std::error_code error;
   std::vector<std::filesystem::path> made;
   for (std::filesystem::path at = options.out; !at.empty() && !std::filesystem::exists(at, error);
@@ -257,6 +262,49 @@ void make_directory(const CommonOptions& options, const std::vector<std::string>
   }
 }
 
+std::unique_ptr<files::DirectoryLock> locked(const CommonOptions& options, files::DirectoryLock::Kind kind) {
+  auto lock = std::make_unique<files::DirectoryLock>(options.out, kind);
+  while (lock->gone()) {  // a run that failed removed what it had made
+    create_out(options);
+    lock = std::make_unique<files::DirectoryLock>(options.out, kind);
+  }
+  if (lock->taken()) {
+    throw InputError("--out " + options.out.string() +
+                     ": another run is writing into it: wait until that has ended, or choose another --out");
+  }
+  return lock;
+}
+
+}  // namespace
+
+void make_directory(const CommonOptions& options, const std::vector<std::string>& files,
+                    files::DirectoryLock::Kind lock) {
+  if (options.out.empty()) {
+    return;
+  }
+  const std::lock_guard<std::mutex> guard(made_mutex());
+  create_out(options);
+  if (files.empty() || place_of(options) != nullptr) {
+    return;
+  }
+  ResultPlace place{options.out, files.front(), {}, locked(options, lock)};
+  std::vector<std::string> names = files;
+  names.emplace_back(kPage);
+  for (const std::string& name : names) {
+    if (const std::filesystem::path file = options.out / name; is_there(file)) {
+      const std::string other = whose(options, files.front(), name);
+      if (!other.empty() && !options.force) {
+        throw InputError(fmt::format("{}: is there already, {}: expected another --out, or --force to replace it",
+                                     file.string(), other));
+      }
+      if (other.empty()) {
+        place.left.push_back(name);
+      }
+    }
+  }
+  result_places().push_back(std::move(place));
+}
+
 namespace {
 
 // What a run writes into `out`, all of it before any of it is put there.
@@ -268,7 +316,6 @@ struct Gathering {
 
   std::filesystem::path out;
   files::Temporary directory;
-  std::vector<std::string> dropped;
 };
 
 std::unique_ptr<Gathering>& gathering() {
@@ -309,15 +356,14 @@ void write_to(const std::filesystem::path& to, const std::filesystem::path& from
 
 }  // namespace
 
-void write_page(const CommonOptions& options, std::string page) {
-  if (!options.out.empty()) {
+void write_failure_page(const CommonOptions& options, std::string page) {
+  const ResultPlace* const place = place_of(options);
+  if (!options.out.empty() && (place == nullptr || std::ranges::count(place->left, place->result) == 0)) {
     files::atomic_write(options.out / kPage, named_page(options, std::move(page)));
   }
 }
 
 std::filesystem::path gathered(const CommonOptions& options) { return gathering_for(options).directory.path(); }
-
-void drop(const CommonOptions& options, const std::string& name) { gathering_for(options).dropped.push_back(name); }
 
 void discard_gathered() { gathering().reset(); }
 
@@ -325,20 +371,23 @@ void publish(const CommonOptions& options, const Json& result, const std::string
   if (!options.out.empty()) {
     const Gathering& all = gathering_for(options);
     const std::filesystem::path& from = all.directory.path();
-    files::atomic_write(from / kPage, named_page(options, report));
+    if (!report.empty()) {
+      files::atomic_write(from / kPage, named_page(options, report));
+    }
     files::write_json(from / name, result);
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(from)) {
       names.push_back(entry.path().filename().string());
     }
     std::ranges::sort(names, {}, [&](const std::string& each) { return std::pair(each == name, each); });
+    ResultPlace* const place = place_of(options);
+    std::vector<std::string> gone = place != nullptr ? place->left : std::vector<std::string>();
+    std::erase_if(gone, [&](const std::string& each) { return std::ranges::count(names, each) > 0; });
     // Files one after another and without a break; before them what is written to as it is, which may wait for a reader.
-    const auto renamed = std::ranges::stable_partition(
-        names, [&](const std::string& each) { return !is_to_be_renamed(options.out / each); });
-    std::for_each(names.begin(), renamed.begin(),
-                  [&](const std::string& each) { write_to(options.out / each, from / each); });
-    if (const std::string why = files::move_together(from, options.out, {renamed.begin(), renamed.end()}, all.dropped);
-        !why.empty()) {
+    const auto renamed = std::stable_partition(
+        names.begin(), names.end(), [&](const std::string& each) { return !is_to_be_renamed(options.out / each); });
+    std::for_each(names.begin(), renamed, [&](const std::string& each) { write_to(options.out / each, from / each); });
+    if (const std::string why = files::move_together(from, options.out, {renamed, names.end()}, gone); !why.empty()) {
       throw InputError(why + ": expected a writable place");
     }
     discard_gathered();

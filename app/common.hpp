@@ -22,6 +22,7 @@
 #include <wheelwright/detector/detector.hpp>
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/json.hpp>
+#include <wheelwright/files/temporary.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/report/commission_report.hpp>
@@ -122,25 +123,27 @@ void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesy
 
 /// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible, and, unless --force
 /// is given, where something else would be replaced than the command's own earlier result. `files` are the names that
-/// it writes beside report.html: first the result, KIND.json of the schema wheelwright/KIND, by which it knows itself,
-/// then what else it writes, which is its own where it is not younger than that.
-void make_directory(const CommonOptions& options, const std::vector<std::string>& files = {});
+/// it may write beside report.html: first the result, KIND.json of the schema wheelwright/KIND, by which it knows itself,
+/// then what else it writes, which is its own where it is not younger than that. Where there are any, `out` is locked
+/// until the program ends: InputError where another one writes results into it, unless both share it.
+void make_directory(const CommonOptions& options, const std::vector<std::string>& files = {},
+                    files::DirectoryLock::Kind lock = files::DirectoryLock::Kind::alone);
 /// Removes what make_directory() made and nothing was put into: a run that failed leaves no empty directories.
 void remove_empty_directories();
 
-/// Writes out/report.html where a directory is wanted, with the name of the command in its head.
-void write_page(const CommonOptions& options, std::string page);
+/// Writes out/report.html where a directory is wanted, with the name of the command in its head; nothing where an earlier
+/// result of the command stands there, whose page stays beside it.
+void write_failure_page(const CommonOptions& options, std::string page);
 
 /// Directory inside of `out` (not empty) for the files of a result that stand beside its JSON: publish() moves them out
 /// of it, a run that fails leaves none of them, and replaces none of an earlier one's.
 [[nodiscard]] std::filesystem::path gathered(const CommonOptions& options);
-/// publish() removes out/name, which an earlier run may have left and this one's result has not.
-void drop(const CommonOptions& options, const std::string& name);
 /// Removes what is gathered and was not published.
 void discard_gathered();
 
-/// Writes `result` to out/name and report to out/report.html where a directory is wanted, with what was gathered(), all
-/// of it or nothing, and the result to standard output with --json.
+/// Writes `result` to out/name and `report`, unless it is empty, to out/report.html where a directory is wanted, with
+/// what was gathered(), in place of all that make_directory() found of an earlier run; all of it or nothing. Writes the
+/// result to standard output with --json.
 void publish(const CommonOptions& options, const Json& result, const std::string& name, const std::string& report);
 
 /// Prints what reading a log found (sentences(LogReport)), a line each, on standard output.
@@ -150,14 +153,14 @@ void print_log(const std::vector<std::string>& sentences);
 [[nodiscard]] report::ReportContext report_context(const CommonOptions& options, const logs::LogReport& data,
                                                    LogSource& log);
 
-/// Runs `work` and returns what it returns. Where it throws an Error and results are wanted, out/report.html shows the
-/// message and the raw signals of `context`; the error is thrown on.
+/// Runs `work` and returns what it returns. Where it throws an Error and results are wanted, write_failure_page() shows
+/// the message and the raw signals of `context`; the error is thrown on.
 template <typename Work>
 auto or_failure_page(const CommonOptions& options, const report::ReportContext& context, const Work& work) {
   try {
     return work();
   } catch (const Error& error) {
-    write_page(options, report::failure_report(error.what(), context));
+    write_failure_page(options, report::failure_report(error.what(), context));
     throw;
   }
 }

@@ -147,25 +147,35 @@ std::string origin(const Arguments& a, const Diagnosis& d) {
 void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& next, const Robot& robot) {
   const std::filesystem::path out = gathered(a.common);
   results::write_residuals(out / kResiduals, d.series);
-  // What an earlier run left would contradict this one.
   if (d.improved) {
     files::atomic_write(out / kImproved,
                         origin(a, d) + robots::robot_yaml(*d.improved) + robots::columns_yaml(a.common.columns));
-  } else {
-    drop(a.common, kImproved);
   }
   if (next.commands) {
     write_drive(out, kNext, *next.commands, robot);
-  } else {
-    for (const std::string& file : drive_files(kNext)) {
-      drop(a.common, file);
-    }
   }
 }
 
 // Name of an edited file in the directory of results: robot_improved.xml of robot.xml.
 std::string edited_name(const std::filesystem::path& source) {
   return source.stem().string() + "_improved" + source.extension().string();
+}
+
+// Names of the edited files that stand beside an earlier result.
+std::vector<std::string> earlier_simulators(const std::filesystem::path& result) {
+  std::vector<std::string> names;
+  if (std::filesystem::is_regular_file(result)) {
+    try {
+      const Json json = files::read_json(result);
+      for (const Json& simulator : json.at("simulators")) {
+        if (const Json& file = simulator.at("file"); file.is_string()) {
+          names.push_back(std::filesystem::path(file.get<std::string>()).filename().string());
+        }
+      }
+    } catch (const std::exception&) {  // no result of this command: make_directory() says so
+    }
+  }
+  return names;
 }
 
 // A file of the user's simulator.
@@ -229,7 +239,7 @@ model::SimulatorChange change_of(LogSource& log, LogSource* baseline, const Robo
   return gap::simulator_change(prepared.view.physical ? prepared.view.robot : robot, prepared.drive, d);
 }
 
-// Edits the files and writes those of which something changed; what an earlier run left of the others is removed.
+// Edits the files and writes those of which something changed.
 std::vector<robots::EditedSimulator> write_simulators(const Arguments& a, const std::vector<SimulatorSource>& sources,
                                                       const model::SimulatorChange& change, const Robot& robot,
                                                       Json& result) {
@@ -238,9 +248,7 @@ std::vector<robots::EditedSimulator> write_simulators(const Arguments& a, const 
     edits.push_back(robots::edit_simulator(source.format, source.text, source.path.string(), change, robot, a.wheels));
     const robots::EditedSimulator& edit = edits.back();
     const std::string name = edited_name(source.path);
-    if (edit.changed.empty()) {
-      drop(a.common, name);
-    } else {
+    if (!edit.changed.empty()) {
       files::atomic_write(gathered(a.common) / name, edit.text);
     }
     result["simulators"].push_back(
@@ -281,6 +289,9 @@ int run(const Arguments& a) {
     if (!simulator.empty()) {
       written.push_back(edited_name(simulator));
     }
+  }
+  for (const std::string& file : earlier_simulators(a.common.out / "gap.json")) {
+    written.push_back(file);
   }
   make_directory(a.common, written);
   Robot robot = read_robot(a.robot);

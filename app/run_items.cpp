@@ -59,17 +59,17 @@ void check_together(const CommonOptions& common, const ScaleOptions& scale) {
 }
 
 // What every process that takes part has to agree on.
-std::string fingerprint(const results::StoredPlan& plan, const results::StoredItems& items) {
+std::string fingerprint(const results::StoredPlan& plan, const ItemsToRun& items) {
   std::string text;
   for (const auto& [name, value] : plan) {
     text += fmt::format("{}: {}\n", name, value);
   }
   files::Xxh64 keys;
-  for (std::size_t item = 0; item < items.count; ++item) {
-    const std::string key = items.key(item) + '\n';
+  for (std::size_t item = 0; item < items.work.items; ++item) {
+    const std::string key = (items.agreed ? items.agreed(item) : items.key(item)) + '\n';
     keys.update(key.data(), key.size());
   }
-  return text + fmt::format("{} items {}\n", items.count, keys.text());
+  return text + fmt::format("{} items {}\n", items.work.items, keys.text());
 }
 
 // Shards in `directory`, by file name.
@@ -120,6 +120,18 @@ void check_complete(results::SqliteResults& results, const std::vector<std::pair
                   missing > kNamed ? ", …" : "", core::listed(again)));
 }
 
+// Of the items whose results are not kept: the first ones.
+std::vector<std::string> names_of_passing(const results::SqliteResults& results) {
+  std::vector<std::string> names;
+  for (const auto& [item, result] : results.passing()) {
+    names.push_back(names.size() < kNamed ? files::shown(results.items().key(item)) : "…");
+    if (names.size() > kNamed) {
+      break;
+    }
+  }
+  return names;
+}
+
 }  // namespace
 
 std::optional<study::Shard> shard_of(std::string_view text) {
@@ -135,13 +147,18 @@ std::optional<study::Shard> shard_of(std::string_view text) {
   return shard;
 }
 
+files::DirectoryLock::Kind lock_for(const ScaleOptions& scale) {
+  using enum files::DirectoryLock::Kind;
+  return scale.shard || launched_by_mpi() ? shared : alone;
+}
+
 ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const ScaleOptions& scale,
                    const std::function<void(std::size_t, std::size_t)>& progress) {
   check_together(common, scale);
   make_directory(common);
   results::StoredPlan plan = items.plan;
   plan.emplace_back("the program", results::software());
-  const results::StoredItems stored{items.work.items, items.key};
+  const results::StoredItems stored{items.work.items, items.key, items.passing};
   const Opening opening = scale.fresh ? Opening::fresh : Opening::resume;
   const auto open = [&](const std::string& name) {
     return std::make_unique<results::SqliteResults>(common.out.empty() ? fs::path() : common.out / name, plan, stored,
@@ -157,6 +174,10 @@ ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const S
     if (!common.quiet && !common.json) {
       say("shard {} of {}: {} items evaluated, {} were there; {}\nwhen all are done: the same with --merge\n",
           shard.index + 1, shard.count, run.count.evaluated, run.count.found, results->file().string());
+      if (!results->passing().empty()) {
+        say("not kept: {}: changed while they were read; run this shard again\n",
+            core::listed(names_of_passing(*results)));
+      }
     }
     return run;
   }
@@ -178,7 +199,7 @@ ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const S
   if (launched_by_mpi()) {
     std::unique_ptr<results::SqliteResults> results;
     const std::optional<study::RunCount> count = run_on_ranks(
-        items.work, fingerprint(plan, stored),
+        items.work, fingerprint(plan, items),
         [&]() -> study::ResultStore& {
           results = open(kResults);
           return *results;

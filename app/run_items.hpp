@@ -36,6 +36,10 @@ struct ItemsToRun {
   /// What every result depends on; run_items() adds the program's version. No option that changes no result (threads,
   /// shard).
   results::StoredPlan plan;
+  /// StoredItems::passing.
+  std::function<bool(std::size_t item, std::string_view result)> passing = {};
+  /// What processes under mpirun have to agree on of an item. May be empty: its key.
+  std::function<std::string(std::size_t item)> agreed = {};
 };
 
 /// Outcome of a run.
@@ -55,6 +59,9 @@ struct ItemsRun {
 /// leaves items missing: the message names them and the shards that evaluate them.
 [[nodiscard]] ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const ScaleOptions& scale,
                                  const std::function<void(std::size_t done, std::size_t items)>& progress = {});
+
+/// How `out` is locked (make_directory()): shards and processes of one mpirun share it.
+[[nodiscard]] files::DirectoryLock::Kind lock_for(const ScaleOptions& scale);
 
 /// True if this process is one of several that mpirun or srun started together, by the environment they set; MPI itself
 /// is not asked, so that a plain run never starts it. False where that says that there is one alone.

@@ -86,7 +86,7 @@ ItemsToRun items_of(const study::Study& study, const study::StudyDesign& design)
 }
 
 int run(const Arguments& a) {
-  make_directory(a.common, {"sensitivity.json"});
+  make_directory(a.common, {"sensitivity.json"}, lock_for(a.scale));
   results::StudyFile file = results::read_study(a.study);
   const study::Study& study = file.study;
   const study::StudyDesign design = study::design_of(study);

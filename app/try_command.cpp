@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -243,19 +245,32 @@ struct Page {
 // A robot file that stands for a run that did not come to its end, and would be taken for the user's.
 class Unfinished {
  public:
-  explicit Unfinished(std::filesystem::path file) : file_(std::move(file)), mine_(!std::filesystem::exists(file_)) {}
+  explicit Unfinished(std::filesystem::path file) : file_(std::move(file)), mine_(!std::filesystem::exists(file_)) {
+    if (std::ifstream in(file_, std::ios::binary); std::filesystem::is_regular_file(file_)) {
+      before_ = std::string(std::istreambuf_iterator<char>(in), {});
+    }
+  }
   ~Unfinished() {
-    if (std::error_code ignored; mine_) {
-      std::filesystem::remove(file_, ignored);
+    try {
+      if (before_) {
+        files::atomic_write(file_, *before_);
+      } else if (mine_) {
+        std::filesystem::remove(file_);
+      }
+    } catch (const std::exception&) {  // what went wrong is told already
     }
   }
   Unfinished(const Unfinished&) = delete;
   Unfinished& operator=(const Unfinished&) = delete;
-  void keep() { mine_ = false; }
+  void keep() {
+    mine_ = false;
+    before_.reset();
+  }
 
  private:
   std::filesystem::path file_;
   bool mine_;
+  std::optional<std::string> before_;
 };
 
 /// Runs another command with its own options; false, with the reason in `why`, where it refuses.
@@ -443,6 +458,9 @@ int run(const Arguments& given) {
   result["verdict"] = verdict;
   result["sentences"] = said;
   result["taken"] = took;
+  if (!yaml.empty()) {
+    files::atomic_write(gathered(a.common) / file.filename(), yaml);
+  }
   publish(a.common, result, "try.json", report::page(page.content));
   if (unfinished) {
     unfinished->keep();

@@ -168,6 +168,23 @@ std::string Temporary::move_to(const fs::path& place) {
   return sync_directory(place.parent_path());
 }
 
+DirectoryLock::DirectoryLock(const fs::path& directory, Kind kind)
+    : descriptor_(open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  taken_ = descriptor_ >= 0 && flock(descriptor_, (kind == Kind::alone ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0 &&
+           errno == EWOULDBLOCK;
+}
+
+DirectoryLock::~DirectoryLock() {
+  if (descriptor_ >= 0) {
+    close(descriptor_);
+  }
+}
+
+bool DirectoryLock::gone() const {
+  struct stat here {};
+  return descriptor_ >= 0 && fstat(descriptor_, &here) == 0 && here.st_nlink == 0;
+}
+
 std::string sync_directory(const fs::path& directory) {
   const int descriptor = open(directory.empty() ? "." : directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) {

@@ -226,6 +226,7 @@ std::string record_text(const study::RobotRecord& record) {
   }
   json["notes"] = record.notes;
   json["findings"] = record.findings;
+  json["passing"] = record.passing;
   return files::json_text(json, -1);
 }
 
@@ -258,6 +259,7 @@ study::RobotRecord record_from_text(std::string_view text, const std::string& wh
   }
   record.notes = at.at("notes").texts();
   record.findings = at.at("findings").texts();
+  record.passing = at.at("passing").boolean();
   return record;
 }
 

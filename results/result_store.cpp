@@ -2,7 +2,6 @@
 #include <wheelwright/results/result_store.hpp>
 
 #include <cstdint>
-#include <map>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -223,13 +222,20 @@ SqliteResults::SqliteResults(const fs::path& file, const StoredPlan& plan, Store
 
 SqliteResults::~SqliteResults() = default;
 
-bool SqliteResults::has(std::size_t item) { return tables_->has(items_.key(item)); }
+bool SqliteResults::has(std::size_t item) { return passing_.contains(item) || tables_->has(items_.key(item)); }
 
 void SqliteResults::put(std::size_t item, std::string_view result) {
-  tables_->put(items_.key(item), result, tables_->name());
+  if (items_.passing && items_.passing(item, result)) {
+    passing_.emplace(item, result);
+  } else {
+    tables_->put(items_.key(item), result, tables_->name());
+  }
 }
 
-std::optional<std::string> SqliteResults::get(std::size_t item) { return tables_->get(items_.key(item)); }
+std::optional<std::string> SqliteResults::get(std::size_t item) {
+  const auto passing = passing_.find(item);
+  return passing != passing_.end() ? passing->second : tables_->get(items_.key(item));
+}
 
 void SqliteResults::each(const std::function<void(std::size_t, std::string_view)>& take) {
   for (std::size_t item = 0; item < items_.count; ++item) {

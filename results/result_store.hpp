@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +31,9 @@ struct StoredItems {
   /// A text that stands for all that the item alone depends on, and no other item has, e.g. name and hashes of its
   /// logs. An item whose key changed is evaluated anew; one that moved in the list is not.
   std::function<std::string(std::size_t item)> key;
+  /// True for a result that is none of what the key stands for: it is gone with the object, never in the file. May be
+  /// empty: none is.
+  std::function<bool(std::size_t item, std::string_view result)> passing = {};
 };
 
 /// A store in an SQLite file.
@@ -74,12 +78,15 @@ class SqliteResults final : public study::ResultStore {
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   /// The items.
   [[nodiscard]] const StoredItems& items() const { return items_; }
+  /// Results that are not in the file (StoredItems::passing), by item.
+  [[nodiscard]] const std::map<std::size_t, std::string>& passing() const { return passing_; }
 
  private:
   class Tables;
   std::filesystem::path file_;
   StoredPlan plan_;
   StoredItems items_;
+  std::map<std::size_t, std::string> passing_;
   std::unique_ptr<Tables> tables_;
 };
 

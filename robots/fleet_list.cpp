@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <wheelwright/robots/fleet_list.hpp>
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -284,22 +286,41 @@ std::vector<FleetListRobot> read_directory(const fs::path& directory) {
   return fleet;
 }
 
-// Size and time of change of a file, or of the files in a directory.
-std::string state_of(const fs::path& path) {
+// Size and time of change of a file.
+std::string state_of(const fs::path& file) {
   std::error_code error;
-  if (is_folder(path)) {
-    std::string out;
-    for (const fs::path& entry : entries_of(path)) {
-      out += entry.filename().string() + " " + (is_folder(entry) ? "a directory" : state_of(entry)) + ";";
-    }
-    return out;
-  }
-  const auto size = fs::file_size(path, error);
+  const auto size = fs::file_size(file, error);
   if (error) {
     return "absent";
   }
-  const auto changed = fs::last_write_time(path, error);
+  const auto changed = fs::last_write_time(file, error);
   return fmt::format("{} bytes, {}", size, error ? 0 : changed.time_since_epoch().count());
+}
+
+// Which file it is, its size, and when anything of it changed.
+std::string exact_state_of(const fs::path& file) {
+  struct stat now {};
+  if (stat(file.c_str(), &now) != 0) {
+    return "absent";
+  }
+  return fmt::format("{} {} {} {}.{} {}.{}", now.st_dev, now.st_ino, now.st_size, now.st_mtim.tv_sec,
+                     now.st_mtim.tv_nsec, now.st_ctim.tv_sec, now.st_ctim.tv_nsec);
+}
+
+// Of a file, or of the files in a directory.
+std::string state_of(const fs::path& path, std::string (*of_file)(const fs::path&)) {
+  if (!is_folder(path)) {
+    return of_file(path);
+  }
+  std::string out;
+  try {
+    for (const fs::path& entry : entries_of(path)) {
+      out += entry.filename().string() + " " + (is_folder(entry) ? "a directory" : of_file(entry)) + ";";
+    }
+  } catch (const fs::filesystem_error&) {
+    out += "unreadable";
+  }
+  return out;
 }
 
 }  // namespace
@@ -347,10 +368,11 @@ std::vector<FleetListRobot> read_fleet(const std::filesystem::path& path) {
 std::string key_of(const FleetListRobot& robot) {
   std::string key = robot.name;
   const auto take = [&](const char* role, const FleetListLog& log) {
-    key += fmt::format("\n{} {} at {}: {}", role, log.path.string(), files::number_text(log.when), state_of(log.path));
+    key += fmt::format("\n{} {} at {}: {}", role, log.path.string(), files::number_text(log.when),
+                       state_of(log.path, state_of));
   };
   if (!robot.robot_file.empty()) {
-    key += fmt::format("\nrobot file {}: {}", robot.robot_file.string(), state_of(robot.robot_file));
+    key += fmt::format("\nrobot file {}: {}", robot.robot_file.string(), state_of(robot.robot_file, state_of));
   }
   for (const FleetListLog& log : robot.commission) {
     take("commission", log);
@@ -363,6 +385,25 @@ std::string key_of(const FleetListRobot& robot) {
     key += "\n" + finding;
   }
   return key;
+}
+
+std::vector<FileState> states_of(const FleetListRobot& robot) {
+  std::vector<FileState> states;
+  const auto take = [&](const fs::path& path) {
+    const std::string state = state_of(path, exact_state_of);
+    files::Xxh64 hash;
+    hash.update(state.data(), state.size());
+    states.push_back({path, hash.digest()});
+  };
+  if (!robot.robot_file.empty()) {
+    take(robot.robot_file);
+  }
+  for (const std::vector<FleetListLog>* const logs : {&robot.commission, &robot.checks}) {
+    for (const FleetListLog& log : *logs) {
+      take(log.path);
+    }
+  }
+  return states;
 }
 
 }  // namespace wheelwright::robots

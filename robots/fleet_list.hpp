@@ -3,6 +3,7 @@
 /// The robots of a fleet and the places of their logs, from a list or a directory.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -47,6 +48,15 @@ struct FleetListRobot {
 /// All that the robot's results depend on beside the fleet's options: its name first, then paths, sizes and times of
 /// change of its files, roles and dates.
 [[nodiscard]] std::string key_of(const FleetListRobot& robot);
+
+/// A file, and a hash of what is another where it was written to, moved, or replaced by one of the same size and time.
+struct FileState {
+  std::filesystem::path path;
+  std::uint64_t state = 0;
+};
+
+/// The robot file and the logs of a robot as they are now, in a fixed order.
+[[nodiscard]] std::vector<FileState> states_of(const FleetListRobot& robot);
 
 /// Days from 1970-01-01 to a date of the Gregorian calendar, "2026-03-01" or "20260301"; nothing for what is none.
 [[nodiscard]] std::optional<double> days_of_date(std::string_view text);

@@ -94,6 +94,7 @@ struct RobotRecord {
   std::vector<CheckRecord> checks{};               ///< in order of time
   std::vector<std::string> notes{};
   std::vector<std::string> findings{};  ///< what is wrong with the robot's entry (a duplicate, a missing file)
+  bool passing = false;  ///< its files changed while they were read: another run says something else of them
 
   friend bool operator==(const RobotRecord&, const RobotRecord&) = default;
 };

@@ -276,7 +276,10 @@ def changed_input(how):
         how(path, place.earlier / path.relative_to(place.folder / "in"), draw)
         run = place.end(process, met=met)
         run.as_if = dataclasses.replace(whole, printed=run.out)  # it may say that the log has ended since
-        if met and run.code in (0, 1) and not whole.all_new(tree_of(place.out)):
+        if whole.name == "fleet" and b"written to while" in tree_of(place.out).get("a/fleet/fleet.json", b""):
+            # A finding of this robot, of which the next run keeps nothing.
+            run.as_if = dataclasses.replace(whole, code=1, printed=run.out, files=tree_of(place.out))
+        elif met and run.code in (0, 1) and not whole.all_new(tree_of(place.out)):
             kept = place.folder / "kept"
             place.out.rename(kept)
             place.clear()

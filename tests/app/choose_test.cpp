@@ -41,6 +41,11 @@ TEST_F(Choose, GivesADetectorAndWhatTheOthersCost) {
   put("chosen.yaml", bytes(path("robot.yaml")) + line + "\n");
   ASSERT_EQ(run("commission learn.csv --robot chosen.yaml --out again --quiet").code, 0);
   EXPECT_EQ(files::read_json(path("again/model.json")).at("parameters"), model.at("parameters"));
+  // Where no filter will do, the model of another question is not left beside that answer.
+  ASSERT_EQ(run("choose learn.csv --robot robot.yaml --fault wheel_radius=0.2 --window 0.01 --out choice --quiet").code,
+            1);
+  EXPECT_THAT(names_in("choice"), ElementsAre("choice.json"));
+  EXPECT_TRUE(files::read_json(path("choice/choice.json")).at("chosen").is_null());
 }
 
 // What is said of the pose is made once for all candidates, and what was commissioned on the way is not commissioned

@@ -11,6 +11,7 @@
 namespace wheelwright::app::fleet_test {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::lines_of;
@@ -54,6 +55,11 @@ class FleetCommand : public testing::ProgramTest {
 
   Outcome fleet(const std::string& out, const std::string& more = "") const {
     return run("fleet fleet/fleet.csv --robot fleet/robot.yaml --quiet --out " + out + " " + more);
+  }
+
+  /// For run(): touches `file` all the time that the program runs.
+  static std::string touching(const std::string& file) {
+    return "sh -c '(while :; do touch " + file + "; done) & \"$@\"; code=$?; kill $!; exit $code' sh";
   }
 
   /// The result files of `out`.
@@ -160,6 +166,37 @@ TEST_F(FleetCommand, HoweverItIsRunTheResultsAreTheSame) {
   scale_efforts("fleet/logs/robot_6_0.csv", 1.02);
   (void)fleet("one");
   EXPECT_NE(results("one")[0], one[0]);
+}
+
+// A log that was still being written ended the whole run with exit code 2, all other robots with it.
+TEST_F(FleetCommand, ALogThatIsWrittenToIsItsRobotsFinding) {
+  make(3, 0, 10);
+  const std::string written = "fleet/logs/robot_2_0.csv";
+  const std::string words = "fleet fleet/fleet.csv --robot fleet/robot.yaml --json --out ";
+  const Outcome told = run(words + "result", "/dev/null", touching(written));
+  ASSERT_EQ(told.code, 1) << told.err;
+  const Json json = Json::parse(told.out);
+  EXPECT_EQ(json["robots"]["status"]["commissioned"], 2);
+  EXPECT_EQ(json["robots"]["status"]["unreadable"], 1);
+  ASSERT_EQ(json["failed"].size(), 1U);
+  EXPECT_EQ(json["failed"][0]["robot"], "robot_2");
+  EXPECT_THAT(json["failed"][0]["reason"].get<std::string>(), AllOf(HasSubstr(written), HasSubstr("written to while")));
+  EXPECT_THAT(bytes(path("result/report.html")), HasSubstr("written to while"));
+  // Then it is as whole as if nothing had been.
+  ASSERT_EQ(run(words + "result").code, 0);
+  ASSERT_EQ(run(words + "whole").code, 0);
+  EXPECT_EQ(results("result"), results("whole"));
+
+  const std::string shard = "fleet fleet/fleet.csv --robot fleet/robot.yaml --out shards ";
+  const Outcome first = run(shard + "--shard 1/1", "/dev/null", touching("fleet/logs/robot_3_0.csv"));
+  ASSERT_EQ(first.code, 0) << first.err;
+  EXPECT_THAT(first.out, AllOf(HasSubstr("not kept: 'robot_3"), HasSubstr("run this shard again")));
+  const Outcome missing = run(shard + "--merge");
+  EXPECT_EQ(missing.code, 2);
+  EXPECT_THAT(missing.err, AllOf(HasSubstr("1 of 3 items are missing"), HasSubstr("robot_3")));
+  EXPECT_THAT(run(shard + "--shard 1/1").out, HasSubstr("1 items evaluated, 2 were there"));
+  ASSERT_EQ(run(shard + "--merge").code, 0);
+  EXPECT_EQ(results("shards"), results("whole"));
 }
 
 TEST_F(FleetCommand, KilledInTheMiddleItGoesOn) {

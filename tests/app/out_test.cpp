@@ -3,6 +3,9 @@
 #include <sys/stat.h>
 
 #include <chrono>
+#include <thread>
+
+#include <wheelwright/files/temporary.hpp>
 
 #include "app/program.hpp"
 
@@ -11,6 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::Outcome;
@@ -42,7 +46,7 @@ TEST_F(Out, ACommandReplacesItsOwnResultAndNoOther) {
   EXPECT_EQ(bytes(path("out/report.html")), first);
 
   refuses(identify, "out/report.html", "the page of `wheelwright doctor`");
-  EXPECT_THAT(names_in("out"), ::testing::ElementsAre("doctor.json", "report.html"));
+  EXPECT_THAT(names_in("out"), ElementsAre("doctor.json", "report.html"));
   EXPECT_EQ(run(identify + " --force").code, 0);
   EXPECT_NE(bytes(path("out/report.html")), first);
   refuses(doctor, "out/report.html", "the page of `wheelwright identify`");
@@ -55,6 +59,96 @@ TEST_F(Out, AFailurePageIsOnesOwn) {
     EXPECT_EQ(outcome.code, 2);
     EXPECT_THAT(outcome.err, ::testing::Not(HasSubstr("is there already")));
   }
+}
+
+// The page of a run that failed replaced that of the model beside it.
+TEST_F(Out, ARunThatFailsLeavesAnEarlierResultWithItsPage) {
+  commission_shipped();
+  const std::string model = bytes(path("model/model.json")), page = bytes(path("model/report.html"));
+  std::string still = "t,phi_r,phi_l,tau_r,tau_l\n";
+  for (int k = 0; k < 2000; ++k) {
+    still += fmt::format("{},0,0,0,0\n", 0.01 * k);
+  }
+  put("still.csv", still);
+  put("first.yaml", bytes(path("robot.yaml")) + "filter: {order: 1}\n");  // which needs more than angles
+  const std::string fails = "commission still.csv --robot first.yaml --quiet --out ";
+  EXPECT_EQ(run(fails + "model").code, 2);
+  EXPECT_THAT(names_in("model"), ElementsAre("model.json", "report.html"));
+  EXPECT_EQ(bytes(path("model/model.json")), model);
+  EXPECT_EQ(bytes(path("model/report.html")), page);
+  for (int time = 0; time < 2; ++time) {
+    EXPECT_EQ(run(fails + "none").code, 2);
+    EXPECT_THAT(names_in("none"), ElementsAre("report.html"));
+  }
+
+  // A no is an answer, too: all files are of this run.
+  EXPECT_EQ(run("commission still.csv --robot robot.yaml --quiet --out model").code, 1);
+  EXPECT_EQ(files::read_json(path("model/model.json")).at("status"), "nothing");
+  EXPECT_NE(bytes(path("model/report.html")), page);
+}
+
+// The edited file of an earlier run stood beside a result that knew nothing of it.
+TEST_F(Out, WhatAnEarlierRunWroteBesideItsResultGoesWithIt) {
+  fs::create_directory(path("out"));
+  put("out/gap.json",
+      "{\n  \"schema\": \"wheelwright/gap/1\", \"simulators\": [{\"file\": \"mine_improved.xml\"}, {\"file\": "
+      "\"../robot.yaml\"}, {\"file\": null}]}");
+  for (const char* const name : {"mine_improved.xml", "next_manoeuvre.csv", "robot_improved.yaml", "notes.txt"}) {
+    put(fmt::format("out/{}", name), "of an earlier run");
+  }
+  put_lines("log.csv", healthy_lines());
+  const Outcome done = run("gap log.csv --robot robot.yaml --no-manoeuvre --no-shrink --quiet --out out");
+  ASSERT_EQ(done.code, 0) << done.err;
+  const std::vector<std::string> names = names_in("out");
+  EXPECT_THAT(names, ::testing::IsSupersetOf({"gap.json", "notes.txt", "report.html", "residuals.csv"}));
+  EXPECT_THAT(names, ::testing::Not(::testing::Contains("mine_improved.xml")));
+  EXPECT_THAT(names, ::testing::Not(::testing::Contains("next_manoeuvre.csv")));
+  EXPECT_TRUE(fs::exists(path("robot.yaml")));
+}
+
+// Two runs at once left the page of one beside the result of the other. This one waits in the middle of writing, for a
+// reader of its page.
+TEST_F(Out, AnotherRunIsRefusedWhileOneWrites) {
+  put_lines("log.csv", healthy_lines());
+  fs::create_directory(path("out"));
+  ASSERT_EQ(mkfifo(path("out/report.html").c_str(), 0600), 0);
+  const std::string doctor =
+      fmt::format("cd '{}' && timeout 60 '{}' doctor log.csv --robot robot.yaml --quiet --out out", directory_.string(),
+                  WHEELWRIGHT_PROGRAM);
+  std::thread first([&] { EXPECT_EQ(std::system(doctor.c_str()), 0); });
+  const auto locked = [&] { return files::DirectoryLock(path("out"), files::DirectoryLock::Kind::shared).taken(); };
+  for (int look = 0; look < 2000 && !locked(); ++look) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  for (const char* const command : {"doctor", "identify"}) {
+    const Outcome second = run(fmt::format("{} {} --out ./out/", command, healthy()));
+    EXPECT_EQ(second.code, 2);
+    EXPECT_THAT(second.err,
+                AllOf(HasSubstr("--out ./out/: another run is writing into it"), HasSubstr("another --out")));
+  }
+  const std::string page = locked() ? bytes(path("out/report.html")) : "nobody writes it";
+  first.join();
+  EXPECT_THAT(page, HasSubstr("log.csv"));
+  EXPECT_THAT(names_in("out"), ElementsAre("doctor.json", "report.html"));
+  EXPECT_EQ(files::read_json(path("out/doctor.json")).at("logs").at(0), "log.csv");
+  fs::remove(path("out/report.html"));
+  EXPECT_EQ(run(fmt::format("doctor {} --out out", healthy())).code, 0) << "the other one has ended";
+}
+
+TEST_F(Out, ShardsWriteIntoOneDirectoryAtOnce) {
+  fs::create_directories(path("robots"));
+  fs::create_directories(path("out"));
+  fs::copy_file(examples() / "healthy.csv.gz", path("robots/amy.csv.gz"));
+  const std::string fleet = "fleet robots --robot robot.yaml --quiet --out out ";
+  {
+    const files::DirectoryLock other(path("out"), files::DirectoryLock::Kind::shared);
+    EXPECT_EQ(run(fleet + "--shard 1/1").code, 0);
+    EXPECT_THAT(run(fleet + "--merge").err, HasSubstr("another run is writing"));
+    EXPECT_THAT(run(fleet).err, HasSubstr("another run is writing"));
+  }
+  EXPECT_LE(run(fleet + "--merge").code, 1);
+  const files::DirectoryLock other(path("out"), files::DirectoryLock::Kind::alone);
+  EXPECT_THAT(run(fleet + "--shard 1/1").err, HasSubstr("another run is writing"));
 }
 
 TEST_F(Out, WhatAUserWroteStays) {
@@ -142,7 +236,7 @@ TEST_F(Out, AFullDiskLeavesAllOfAnEarlierResultOrNothing) {
   fs::copy_file(examples() / "healthy.csv.gz", path("robots/amy.csv.gz"));
   const std::string fleet = "fleet robots --robot robot.yaml --quiet --out out/fleet";
   EXPECT_EQ(run(fleet, "/dev/null", kFullDisk).code, 2);
-  EXPECT_THAT(names_in("out/fleet"), ::testing::ElementsAre("results.sqlite"));  // from which it goes on
+  EXPECT_THAT(names_in("out/fleet"), ElementsAre("results.sqlite"));  // from which it goes on
   EXPECT_LE(run(fleet).code, 1);
   EXPECT_THAT(names_in("out/fleet"), ::testing::IsSupersetOf({"fleet.csv", "fleet.json", "pooled_prior.yaml"}));
 }
@@ -158,6 +252,14 @@ TEST_F(Out, AFailedRunLeavesNoDirectory) {
   EXPECT_EQ(outcome.code, 2) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("a/b/doctor"));
   EXPECT_FALSE(fs::exists(path("a")));
+  // Nor its own in place of the robot file of an earlier run.
+  const std::string tried = "try log.csv --quiet --out a/b --track-width 0.381 --wheel-radius ";
+  ASSERT_LE(run(tried + "0.0975").code, 1);
+  const std::string robot = bytes(path("a/b/robot.yaml"));
+  EXPECT_EQ(run(tried + "0.05", "/dev/null", "trap '' XFSZ; ulimit -f 8;").code, 2);
+  EXPECT_EQ(bytes(path("a/b/robot.yaml")), robot);
+  EXPECT_LE(run(tried + "0.05").code, 1);
+  EXPECT_NE(bytes(path("a/b/robot.yaml")), robot);
 }
 
 TEST_F(Out, WhatIsReadIsNotReplacedByForce) {

@@ -44,5 +44,30 @@ TEST_F(Ranks, OnOneMachineListenOnNoAddress) {
   EXPECT_THAT(bytes(path("calls")), HasSubstr("listen")) << "who asks for the network has it";
 }
 
+// Processes look at the files one after another: a log that was being written when they began ended the run.
+TEST_F(Ranks, ALogThatIsWrittenToIsItsRobotsFinding) {
+  if (testing_support::skip_unless(starts(), "mpirun does not start two processes")) {
+    return;
+  }
+  std::filesystem::create_directory(path("fleet"));
+  for (const char* const robot : {"amy", "bob", "cleo"}) {
+    std::filesystem::copy_file(examples() / "healthy.csv.gz", path("fleet") / (std::string(robot) + ".csv.gz"));
+  }
+  const std::string words = "fleet fleet --robot robot.yaml --threads 1 --json --out out";
+  const std::string ranks = fmt::format("{} -n 2", kMpi);
+  const Outcome told = run(words, "/dev/null",
+                           "sh -c '(while :; do touch fleet/bob.csv.gz; done) & \"$@\"; code=$?; kill $!; exit $code' "
+                           "sh env " +
+                               ranks);
+  ASSERT_EQ(told.code, 1) << told.err;
+  const Json json = Json::parse(told.out);
+  EXPECT_EQ(json["robots"]["status"]["commissioned"], 2);
+  ASSERT_EQ(json["failed"].size(), 1U);
+  EXPECT_THAT(json["failed"][0]["reason"].get<std::string>(), HasSubstr("bob.csv.gz: written to while"));
+  const Outcome again = run(words, "/dev/null", ranks);
+  EXPECT_LE(again.code, 1) << again.err;
+  EXPECT_EQ(Json::parse(again.out)["robots"]["status"]["commissioned"], 3);
+}
+
 }  // namespace
 }  // namespace wheelwright::app::ranks_test

@@ -47,6 +47,7 @@ study::RobotRecord full_record() {
   record.checks = {check, lost};
   record.notes = {"a note"};
   record.findings = {"listed twice"};
+  record.passing = true;
   return record;
 }
 

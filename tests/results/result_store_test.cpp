@@ -110,6 +110,23 @@ TEST_F(ResultStoreTest, OneResultForAKey) {
   EXPECT_EQ(store.get(0), "x");
 }
 
+TEST_F(ResultStoreTest, WhatPassesIsThereAndNotKept) {
+  StoredItems some = items(2);
+  some.passing = [](std::size_t, std::string_view result) { return result.starts_with("for now"); };
+  {
+    SqliteResults store(file(), kPlan, some);
+    store.put(0, "for now");
+    store.put(1, "one");
+    EXPECT_TRUE(store.has(0));
+    EXPECT_EQ(all(store), (Results{{0, "for now"}, {1, "one"}}));
+    EXPECT_EQ(store.passing().size(), 1U);
+  }
+  SqliteResults store(file(), kPlan, some);
+  EXPECT_EQ(all(store), (Results{{1, "one"}}));
+  store.put(0, "zero");
+  EXPECT_EQ(store.get(0), "zero");
+}
+
 TEST_F(ResultStoreTest, AnotherPlanIsRefusedAndNamed) {
   { SqliteResults(file(), kPlan, items(2)).put(0, "x"); }
   const StoredPlan reordered = {kPlan[1], kPlan[0]};

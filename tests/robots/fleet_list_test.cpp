@@ -134,5 +134,25 @@ TEST_F(FleetList, AKeyIsAnotherWhereALogChanged) {
   EXPECT_NE(before, key_of(list(text)[0]));
 }
 
+TEST_F(FleetList, AnotherFileOfTheSameSizeAndTimeIsAnother) {
+  logs({"a.csv", "b.csv"});
+  put("robot.yaml", "model: differential_drive\n");
+  const FleetListRobot amy = list("robot,log,robot_file\namy,a.csv,robot.yaml\namy,b.csv,robot.yaml\n")[0];
+  const std::vector<FileState> before = states_of(amy);
+  ASSERT_EQ(before.size(), 3U);
+  EXPECT_EQ(before[0].path, path("robot.yaml"));
+  EXPECT_EQ(before[2].path, path("b.csv"));
+  const std::string key = key_of(amy);
+  const auto time = std::filesystem::last_write_time(path("b.csv"));
+  std::filesystem::copy_file(path("b.csv"), path("other.csv"));
+  std::filesystem::rename(path("other.csv"), path("b.csv"));
+  std::filesystem::last_write_time(path("b.csv"), time);
+  const std::vector<FileState> now = states_of(amy);
+  EXPECT_EQ(key_of(amy), key);
+  EXPECT_EQ(now[0].state, before[0].state);
+  EXPECT_EQ(now[1].state, before[1].state);
+  EXPECT_NE(now[2].state, before[2].state);
+}
+
 }  // namespace
 }  // namespace wheelwright::robots::fleet_list_test
