@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -13,6 +10,9 @@
 #include <sstream>
 #include <thread>
 #include <vector>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <optional>
 
+#include <Eigen/QR>
+
 #include <wheelwright/commission/contradiction_search.hpp>
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/identify/time_shift.hpp>

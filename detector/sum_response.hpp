@@ -146,7 +146,7 @@ class SumResponse {
   const OnlineModel* model_;
   const ReferenceMotion* motion_;
   const SumDrive* drive_;
-  bool exact_ = false, stationary_ = false, constant_only_ = false, adds_effort_ = false;
+  bool exact_ = false, stationary_ = false, constant_only_ = false;
   double most_kappa_ = 0.0;
   Eigen::VectorXd largest_;                                // |θ|
   Eigen::MatrixXd motion_gain_, effort_gain_, seen_gain_;  // |K|, |H| + |G|, |S|

@@ -621,6 +621,7 @@ class Hdf5Writer final : public LogWriter {
     H5Pset_chunk(layout.get(), 1, &chunk_rows);
     H5Pset_shuffle(layout.get());
     H5Pset_deflate(layout.get(), packing_level);
+    H5Pset_obj_track_times(layout.get(), false);  // equal logs make equal files, whenever they are written
     Handle dataset(H5Dcreate2(group, name.c_str(), H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, layout.get(), H5P_DEFAULT),
                    H5Dclose);
     if (!dataset) {

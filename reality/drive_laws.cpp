@@ -402,11 +402,12 @@ Effect brush(const RobotDesign& robot, Random random, double severity) {
 Effect linear_sliding(const RobotDesign& robot, Random random, double severity) {
   const auto [stiffness, most] = draw_tyre(robot, random, severity);
   const double sliding = random.uniform(0.75, 1.0) * most;
-  return tyre(robot, {{"slope", stiffness}, {"limit", most}, {"sliding", sliding}}, [=, k = stiffness](double slip) {
-    const double edge = most / k;
-    const double past = std::clamp((std::abs(slip) - edge) / (2.0 * edge), 0.0, 1.0);
-    return std::abs(slip) < edge ? k * slip : std::copysign(most + past * (sliding - most), slip);
-  });
+  return tyre(robot, {{"slope", stiffness}, {"limit", most}, {"sliding", sliding}},
+              [sliding, most = most, k = stiffness](double slip) {
+                const double edge = most / k;
+                const double past = std::clamp((std::abs(slip) - edge) / (2.0 * edge), 0.0, 1.0);
+                return std::abs(slip) < edge ? k * slip : std::copysign(most + past * (sliding - most), slip);
+              });
 }
 
 Effect contact_slip(const RobotDesign& robot, Random random, double severity) {

@@ -430,8 +430,8 @@ std::string assumptions_section(const std::vector<core::Assumption>& assumptions
     return {};
   }
   std::vector<core::Assumption> sorted = assumptions;
-  std::ranges::stable_partition(sorted,
-                                [](const core::Assumption& a) { return a.verdict == core::AssumptionVerdict::fails; });
+  std::stable_partition(sorted.begin(), sorted.end(),
+                        [](const core::Assumption& a) { return a.verdict == core::AssumptionVerdict::fails; });
   std::vector<std::vector<Cell>> rows;
   for (const core::Assumption& a : sorted) {
     const char* status = a.verdict == core::AssumptionVerdict::holds   ? "holds"

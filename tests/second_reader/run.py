@@ -277,7 +277,8 @@ def judge(rows, messages, readable, said):
     origins, before = None, -math.inf
     for k, (t, *values) in enumerate(rows):
         here = {stamp - round(t * 1e9) for stamp in stamps.get(tuple(x if math.isfinite(x) else None for x in values), ())}
-        origins = here if origins is None else {a for a in origins if any(abs(a - b) <= 2 for b in here)}
+        rounding = 2 + 2e9 * math.ulp(t)
+        origins = here if origins is None else {a for a in origins if any(abs(a - b) <= rounding for b in here)}
         if not here:
             return f"row {k + 1} {t, *values} is no message"
         if not origins and "the time of recording is used" not in said:
