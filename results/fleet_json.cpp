@@ -226,7 +226,9 @@ std::string record_text(const study::RobotRecord& record) {
   }
   json["notes"] = record.notes;
   json["findings"] = record.findings;
-  json["passing"] = record.passing;
+  if (record.passing) {
+    json["passing"] = true;
+  }
   return files::json_text(json, -1);
 }
 
@@ -259,7 +261,7 @@ study::RobotRecord record_from_text(std::string_view text, const std::string& wh
   }
   record.notes = at.at("notes").texts();
   record.findings = at.at("findings").texts();
-  record.passing = at.at("passing").boolean();
+  record.passing = at.has("passing") && at.at("passing").boolean();
   return record;
 }
 
