@@ -99,8 +99,10 @@ std::vector<std::string> names_of_files(const std::vector<std::filesystem::path>
 
 void check_without(const std::vector<std::string>& without, const std::vector<Effect>& catalogue) {
   std::vector<std::string> names;
-  for (const Effect& effect : catalogue) {
-    names.push_back(effect.name);
+  for (const Effect& effect : catalogue) {  // an entry for each variant
+    if (std::ranges::find(names, effect.name) == names.end()) {
+      names.push_back(effect.name);
+    }
   }
   for (const std::string& name : without) {
     if (std::ranges::find(names, name) == names.end()) {

@@ -8,6 +8,8 @@
 #   tests/long.sh mutations [COUNT]  every reader on 100,000 mutations, or so many: slowest input and memory
 #   tests/long.sh endurance   a day at 1 kHz, with trouble every hour (tools/endurance.py, ten minutes)
 #   tests/long.sh faults      kills, full disks, closed streams and the like, 2,000 of them (tools/faults.py, as root)
+#   tests/long.sh coverage    lines that the tests run, by room, and those they do not (tools/coverage.py)
+#   tests/long.sh alone       every source file by itself, by clang (tools/check_alone.py, ten minutes)
 #   tests/long.sh sanitizers  all test programs once more under AddressSanitizer and UndefinedBehaviorSanitizer, but for these
 set -eu
 cd "$(dirname "$0")/.."
@@ -34,6 +36,19 @@ for part in ${*:-slow campaign sanitizers}; do
     faults)
       tools/build.sh release wheelwright
       tools/faults.py --program build/bin/wheelwright
+      ;;
+    coverage)
+      tools/build.sh coverage
+      find build-coverage -name '*.gcda' -delete
+      # A test that fails is another run's matter: what it reached counts.
+      ctest --test-dir build-coverage --no-tests=error -j "$jobs" -LE 'package|house' -E "$slow|$campaign" || true
+      tools/coverage.py build-coverage --source > build-coverage/coverage.md
+      sed '/^$/,$d' build-coverage/coverage.md
+      echo "what did not run: build-coverage/coverage.md"
+      ;;
+    alone)
+      tools/setup.sh --ci
+      tools/check_alone.py
       ;;
     sanitizers)
       tools/build.sh asan
@@ -64,7 +79,7 @@ for part in ${*:-slow campaign sanitizers}; do
       ;;
     [0-9]*) ;;
     *)
-      echo "usage: tests/long.sh [slow] [campaign] [endurance] [faults] [sanitizers] | fuzz [SECONDS] | mutations [COUNT]" >&2
+      echo "usage: tests/long.sh [slow] [campaign] [endurance] [faults] [coverage] [alone] [sanitizers] | fuzz [SECONDS] | mutations [COUNT]" >&2
       exit 2
       ;;
   esac

@@ -12,6 +12,7 @@ namespace wheelwright::app::gap_test {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ContainsRegex;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -162,6 +163,8 @@ TEST_F(Gap, SaysWhatIsWrong) {
   EXPECT_THAT(complaint("gone.csv --robot robot.yaml"), HasSubstr("gone.csv"));
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --baseline gone.csv"), HasSubstr("gone.csv"));
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --without colomb"), HasSubstr("did you mean 'coulomb'"));
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --without nothing"),
+              AllOf(HasSubstr("expected one of coulomb, "), Not(ContainsRegex(" coulomb,.* coulomb,"))));
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --out short"), HasSubstr("drive longer"));
   EXPECT_THAT(names_in("short"), ElementsAre("report.html"));
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --beta 0"), HasSubstr("--beta"));

@@ -66,6 +66,38 @@ TEST_F(Usage, BadUsageIsTwo) {
   }
 }
 
+TEST_F(Usage, OptionsThatNeedOthersSayWhich) {
+  put("list.csv", "robot,log\na,a.csv\n");
+  put("a.csv", "t,omega_r\n");
+  for (const auto& [words, expected] : std::initializer_list<std::pair<std::string, std::string>>{
+           {"robot --urdf a.urdf --controller drive", "--controller: expected --ros2-control FILE with it"},
+           {"robot --urdf a.urdf --out-file r.yaml --out d", "--out-file and --out: two places for one file"},
+           {"fleet list.csv --robot robot.yaml --shard 1/2", "--shard: expected --out DIR"},
+           {"fleet list.csv --robot robot.yaml --merge", "--merge: expected --out DIR"},
+           {"fleet list.csv --robot robot.yaml --fresh", "--fresh: expected --out DIR"},
+           {"fleet list.csv --robot robot.yaml --out o --shard 1/2 --merge",
+            "--shard and --merge: expected one of them"},
+           {"fleet list.csv --robot robot.yaml --out o --shard 3/2", "--shard '3/2': expected I/N"},
+           {"fleet list.csv --robot robot.yaml --out o --merge", "no shard-I-of-N.sqlite"},
+           {"gap a.csv --robot robot.yaml --without viscos", "did you mean 'viscous'?"},
+           {"gap a.csv --robot robot.yaml --left a --right b", "--left and --right: expected --write-mjcf"},
+           {"gap a.csv --robot robot.yaml --write-urdf a.urdf", "--write-urdf: expected --out DIR with it"}}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, 2) << words;
+    EXPECT_THAT(outcome.out, IsEmpty()) << words;
+    EXPECT_THAT(outcome.err, HasSubstr(expected)) << words;
+  }
+  commission_shipped();
+  for (const auto& [words, expected] : std::initializer_list<std::pair<std::string, std::string>>{
+           {"--heartbeat 1", "--heartbeat: expected --follow"},
+           {"", "expected a LOG, or --follow"},
+           {"a.csv --layouts", "--layouts: expected --series FILE"}}) {
+    const Outcome outcome = run("detect --model model/model.json " + words);
+    EXPECT_EQ(outcome.code, 2) << words;
+    EXPECT_THAT(outcome.err, HasSubstr(expected)) << words;
+  }
+}
+
 TEST_F(Usage, ExitCodeAnswersTheQuestion) {
   commission_shipped();
   simulate("healthy.yaml", "healthy.csv");

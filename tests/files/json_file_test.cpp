@@ -74,6 +74,10 @@ TEST_F(JsonFile, ErrorsNameTheirPlace) {
               HasSubstr("/parameters/0/list/1: 'null': expected a number"));
   EXPECT_THAT(input_error([&] { (void)entry.at("list").at(std::size_t{2}); }), HasSubstr("at least 3 elements"));
   EXPECT_THAT(input_error([&] { (void)entry.at(std::size_t{0}); }), HasSubstr("expected an array"));
+  EXPECT_THAT(input_error([&] { (void)entry.size(); }),
+              AllOf(HasSubstr("m.json: /parameters/0: "), HasSubstr("expected an array")));
+  EXPECT_THAT(input_error([&] { (void)entry.at("list").keys(); }),
+              AllOf(HasSubstr("m.json: /parameters/0/list: "), HasSubstr("expected an object")));
 }
 
 TEST_F(JsonFile, TextThatIsNoJson) {

@@ -26,6 +26,11 @@ TEST(XmlText, WithoutEditsNothingChanges) {
   EXPECT_EQ(xml.text(*xml.child(0, "mass")), "2.0");
 }
 
+TEST(XmlText, CharactersByNumberAreReadWhereTheyAreAscii) {
+  const XmlText xml = XmlText::parse("<a b='&#77;&#9999;&quot;'/>", "a.xml");
+  EXPECT_EQ(xml.attribute(0, "b"), "M&#9999;\"");
+}
+
 TEST(XmlText, EditsReplaceTheirBytesAlone) {
   XmlText xml = XmlText::parse(kSample, "a.xml");
   const auto mass = *xml.child(*xml.child(0, "link"), "mass");

@@ -195,6 +195,22 @@ TEST(BagColumns, TheMapTakesAnyNumberOfTheLongestTopicThatFits) {
       InputError);
 }
 
+TEST(BagColumns, AMapToMessagesWithoutADefinitionIsAnError) {
+  Bag bag;
+  bag.add("/drive", "my_robot/msg/Drive");
+  bag.add("/odom", "nav_msgs/msg/Odometry");
+  CsvOptions options;
+  EXPECT_NO_THROW(bag.choose(options));
+  options.map = {{"omega_r", "/drive.speed"}};
+  try {
+    bag.choose(options);
+    FAIL() << "nothing was thrown";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("my.mcap: --map omega_r=/drive.speed: the messages of /drive "
+                                        "(my_robot/msg/Drive) cannot be read"));
+  }
+}
+
 TEST(BagColumns, AnElementThatNoMessageNamesIsAnError) {
   Bag bag;
   bag.add("/joint_states", "sensor_msgs/msg/JointState", {"right_wheel", "left_wheel"}, all_arrays);

@@ -248,6 +248,14 @@ TEST_F(Bag, UnusableFilesAreNamed) {
               HasSubstr("other.db3: is an SQLite database but no recording: it has the tables 'people'"));
   Sql(path("columns.db3")).run("CREATE TABLE topics(id INTEGER); CREATE TABLE messages(id INTEGER)");
   EXPECT_THAT(error("columns.db3"), HasSubstr("columns.db3: its tables are not those of rosbag2"));
+  for (const std::string kind :
+       {"VIEW message_definitions AS SELECT 1", "VIRTUAL TABLE message_definitions USING fts4(x)"}) {
+    Sql sql(path("view.db3"));
+    testing::humble_tables(sql);
+    sql.run("CREATE " + kind);
+    EXPECT_THAT(error("view.db3"), HasSubstr("view.db3: table message_definitions is a v"));
+    fs::remove(path("view.db3"));
+  }
   fs::create_directories(path("hollow"));
   EXPECT_THAT(error("hollow"), HasSubstr("hollow: holds no recording"));
   EXPECT_FALSE(is_bag(path("hollow")));

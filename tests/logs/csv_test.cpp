@@ -421,6 +421,9 @@ TEST_F(CsvError, Headers) {
   CsvOptions twice;
   twice.map = {{"tau_r", "a"}, {"tau_l", "a"}};
   EXPECT_THAT(error("t,omega_r,a", twice), HasSubstr("column 'a' is taken for"));
+  // Which of two columns a name means is not guessed.
+  EXPECT_THAT(error("t,omega_r,torq,torq", map), HasSubstr("column 'torq' stands there twice: expected one"));
+  EXPECT_THAT(error("t,omega_r,Torq,TORQ", map), HasSubstr("no column 'torq'"));
 }
 
 TEST_F(CsvError, Rows) {

@@ -318,6 +318,16 @@ TEST_F(LogFile, WhatIsNoLogIsSaid) {
   EXPECT_THROW((void)open_log({}), InvalidArgument);
 }
 
+TEST_F(LogFile, AnHdf5FileDoesNotSayWhenItWasWritten) {
+  const hid_t opened = H5Fopen(write("a.h5", drive()).c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  for (const char* object : {"/log", "/log/t", "/log/omega_r"}) {
+    H5O_info_t info{};
+    ASSERT_GE(H5Oget_info_by_name(opened, object, &info, H5P_DEFAULT), 0);
+    EXPECT_EQ(info.atime + info.mtime + info.ctime + info.btime, 0) << object;
+  }
+  H5Fclose(opened);
+}
+
 TEST_F(LogFile, ADatasetInAnotherUnitIsNotTakenAndThatIsSaid) {
   const std::filesystem::path file = write("a.h5", drive());
   {
@@ -340,6 +350,95 @@ TEST_F(LogFile, ADatasetInAnotherUnitIsNotTakenAndThatIsSaid) {
   LogOptions options;
   options.map = {{"omega_r", "omega_r"}};
   EXPECT_EQ(read({file}, options).names.size(), drive().names.size()) << "asked for by name, it is";
+}
+
+/// An HDF5 file that is made as other programs make theirs.
+class Hdf5File {
+ public:
+  explicit Hdf5File(const std::filesystem::path& path, bool newest = false) {
+    const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+    if (newest) {
+      H5Pset_libver_bounds(access, H5F_LIBVER_LATEST, H5F_LIBVER_LATEST);
+    }
+    file_ = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+    H5Pclose(access);
+  }
+  ~Hdf5File() { H5Fclose(file_); }
+  Hdf5File(const Hdf5File&) = delete;
+  Hdf5File& operator=(const Hdf5File&) = delete;
+
+  void group(const std::string& name) {
+    H5Gclose(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  }
+  /// A dataset whose unit is a string of variable length, behind as many other attributes.
+  void put(const std::string& name, const std::vector<double>& values, const std::string& unit, int before = 0) {
+    const hsize_t rows = values.size();
+    const hid_t line = H5Screate_simple(1, &rows, nullptr), one = H5Screate(H5S_SCALAR), type = H5Tcopy(H5T_C_S1);
+    const hid_t data = H5Dcreate2(file_, name.c_str(), H5T_NATIVE_DOUBLE, line, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    EXPECT_GE(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+    H5Tset_size(type, H5T_VARIABLE);
+    const char* const text = unit.c_str();
+    for (int k = 0; k <= before; ++k) {
+      const std::string called = k == before ? "units" : "note" + std::to_string(k);
+      const hid_t attribute = H5Acreate2(data, called.c_str(), type, one, H5P_DEFAULT, H5P_DEFAULT);
+      EXPECT_GE(H5Awrite(attribute, type, &text), 0);
+      H5Aclose(attribute);
+    }
+    H5Dclose(data);
+    H5Tclose(type);
+    H5Sclose(one);
+    H5Sclose(line);
+  }
+
+ private:
+  hid_t file_ = -1;
+};
+
+TEST_F(LogFile, Hdf5OfOtherProgramsIsReadInTheOldAndTheNewestFormat) {
+  const LogTable table = drive();
+  for (const bool newest : {false, true}) {
+    for (const int before : {0, 6}) {
+      {
+        Hdf5File file(path("a.h5"), newest);
+        file.put("time", table.t, "s", before);
+        file.put("omega_r", table.column("omega_r"), "rad/s", before);
+        file.put("omega_l", table.column("omega_l"), "deg/s", before);
+      }
+      const LogTable got = read({path("a.h5")});
+      EXPECT_EQ(got.t, table.t);
+      ASSERT_EQ(got.names, std::vector<std::string>{"omega_r"}) << newest << before;
+      EXPECT_EQ(got.column("omega_r"), table.column("omega_r"));
+      EXPECT_THAT(report.files[0].notes, Contains(HasSubstr("its unit is 'deg/s', expected rad/s")));
+    }
+  }
+}
+
+TEST_F(LogFile, OfSeveralLogsInAnHdf5FileAMapOfTheTimesTakesOne) {
+  const LogTable table = drive();
+  {
+    Hdf5File file(path("a.h5"));
+    for (const auto& [name, column] : {std::pair{"/first", "omega_l"}, std::pair{"/second", "omega_r"}}) {
+      file.group(name);
+      file.put(name + std::string("/t"), table.t, "s");
+      file.put(name + std::string("/omega_r"), table.column(column), "rad/s");
+    }
+  }
+  EXPECT_EQ(read({path("a.h5")}).column("omega_r"), table.column("omega_l"));
+  EXPECT_THAT(report.files[0].notes, Contains(HasSubstr("there are several logs in it (/first/, /second/)")));
+  LogOptions options;
+  options.map = {{"t", "/second/t"}};
+  EXPECT_EQ(read({path("a.h5")}, options).column("omega_r"), table.column("omega_r"));
+}
+
+TEST_F(LogFile, ADatasetOfAnotherLengthThanTheTimesIsRefused) {
+  const LogTable table = drive();
+  {
+    Hdf5File file(path("a.h5"));
+    file.put("t", table.t, "s");
+    file.put("omega_r", std::vector<double>(table.rows() - 1, 1.0), "rad/s");
+  }
+  EXPECT_THAT(input_error([&] { read({path("a.h5")}); }),
+              AllOf(HasSubstr("a.h5: /omega_r has 1999 values and /t has 2000"), HasSubstr("as many values as times")));
 }
 
 TEST_F(LogFile, AFactorBehindAColumnMultipliesItInEveryFormat) {
@@ -380,6 +479,24 @@ TEST_F(LogFile, AFailedWriteLeavesNothing) {
       EXPECT_THROW(writer->write(block), InvalidArgument) << name;
     }
     EXPECT_EQ(files(), 0U) << name;
+  }
+}
+
+TEST_F(LogFile, ARecordingHoldsNoTimesBeyondThoseOfItsClock) {
+  LogBlock block;
+  for (const double t : {2e9, -2.0}) {
+    block = {};
+    block.t = {t};
+    block.columns = {{1.0}};
+    block.segment_starts = {0};
+    for (const std::string name : {"a.mcap", "a.db3"}) {
+      {
+        const auto writer = create_log(path(name), {"omega_r"});
+        EXPECT_THAT(input_error([&] { writer->write(block); }),
+                    AllOf(HasSubstr(name), HasSubstr("a recording holds times from 0 to 2e9 s")));
+      }
+      EXPECT_EQ(files(), 0U) << name;
+    }
   }
 }
 

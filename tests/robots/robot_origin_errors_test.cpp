@@ -143,6 +143,25 @@ TEST(RobotOriginErrors, WheelsThatAreNotFound) {
               AllOf(HasSubstr("only one joint"), HasSubstr("left_wheel_joint (robot.urdf:"), HasSubstr("--left")));
 }
 
+TEST(RobotOriginErrors, WheelsThatShareNoAxle) {
+  RobotHints hints;
+  hints.left = {"left_wheel_joint"};
+  hints.right = {"right_wheel_joint"};
+  const auto error = [&](const std::string& text) { return input_error([&] { from_urdf(text, hints); }); };
+  const auto at = [](const std::string& xyz) {
+    const std::string text = sample_text();
+    const std::string joint =
+        "left_wheel_joint\" type=\"continuous\">\n<parent link=\"base_link\"/>\n<child "
+        "link=\"left_wheel\"/>\n<origin xyz=\"";
+    const std::size_t from = text.find(joint) + joint.size();
+    return std::string(text).replace(from, text.find('"', from) - from, xyz);
+  };
+  EXPECT_NO_THROW(from_urdf(at("0 0.19 0.05"), hints));
+  EXPECT_THAT(error(at("0.1 0.19 0.05")), HasSubstr("do not share an axle"));
+  EXPECT_THAT(error(changed(sample_text(), "left_wheel_joint", "axis xyz=\"", "axis xyz=\"1")),
+              HasSubstr("has another axis than"));
+}
+
 TEST(RobotOriginErrors, MoreWheelsThanTwo) {
   const auto further = [](const std::string& name, double x, double y) {
     return fmt::format(
@@ -157,6 +176,46 @@ TEST(RobotOriginErrors, MoreWheelsThanTwo) {
   const std::string skid =
       "<gazebo><plugin name=\"d\" filename=\"libgazebo_ros_skid_steer_drive.so\"></plugin></gazebo>";
   EXPECT_THAT(input_error([&] { from_urdf(sample_text(skid)); }), HasSubstr("more than two wheels"));
+}
+
+TEST(RobotOriginErrors, PluginsThatCannotBeUsed) {
+  const auto error = [](const std::string& keys, const std::string& more = "") {
+    return input_error([&] {
+      from_urdf(sample_text("<gazebo>\n<plugin filename=\"libgazebo_ros_diff_drive.so\" name=\"d\">" + keys +
+                            "</plugin>" + more + "</gazebo>"));
+    });
+  };
+  EXPECT_THAT(error("<left_joint/>"),
+              AllOf(HasSubstr("<left_joint>"), HasSubstr("is empty: expected the name of a joint")));
+  EXPECT_THAT(error("<wheelDiameter>0.1</wheelDiameter><wheelDiameter>0.1</wheelDiameter>"),
+              AllOf(HasSubstr("<wheelDiameter>"), HasSubstr("stands there twice")));
+  for (const char* value : {"0", "-0.38", "nan"}) {
+    EXPECT_THAT(error(fmt::format("<wheel_separation>{}</wheel_separation>", value)),
+                AllOf(HasSubstr("<wheel_separation>"), HasSubstr(value), HasSubstr("expected")));
+  }
+  EXPECT_THAT(error("", "\n<plugin filename=\"libgazebo_ros_diff_drive.so\" name=\"e\"/>"),
+              HasSubstr("a second drive beside"));
+}
+
+TEST(RobotOriginErrors, GearsAndEncodersThatAreNone) {
+  const auto error = [](const std::string& inside) {
+    return input_error(
+        [&] { from_urdf(sample_text("<ros2_control name=\"c\" type=\"system\">" + inside + "</ros2_control>")); });
+  };
+  const std::string joint = "<joint name=\"left_wheel_joint\">";
+  for (const char* name : {"mechanicalReduction", "mechanical_reduction"}) {
+    EXPECT_THAT(error(fmt::format("<transmission name=\"t\">{}<{}>0</{}></joint></transmission>", joint, name, name)),
+                AllOf(HasSubstr(name), HasSubstr("0: expected motor turns per turn of the joint")));
+  }
+  for (const char* counts : {"0", "-4096"}) {
+    EXPECT_THAT(error(fmt::format("<hardware><param name=\"enc_counts_per_rev\">{}</param></hardware>", counts)),
+                AllOf(HasSubstr(counts), HasSubstr("expected counts of the encoder per turn, > 0")));
+  }
+}
+
+TEST(RobotOriginErrors, NothingToMakeARobotOf) {
+  EXPECT_THAT(input_error([&] { static_cast<void>(robot_from(nullptr, nullptr)); }),
+              HasSubstr("no robot description and no controller: expected at least one"));
 }
 
 TEST(RobotOriginErrors, FilesOfAnotherKind) {

@@ -3,22 +3,29 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <functional>
 #include <random>
 #include <string>
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/robots/robot_description.hpp>
+#include <wheelwright/robots/simulator_document.hpp>
 #include <wheelwright/robots/simulator_file.hpp>
 #include <wheelwright/robots/wheel_geometry.hpp>
 
 #include "robots/robot_samples.hpp"
 #include "robots/simulator_samples.hpp"
+#include "support/scratch.hpp"
 
 namespace wheelwright::robots::simulator_file_test {
 namespace {
 
 using model::SimulatorChange;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::input_error;
 using testing::sample_mjcf;
 using testing::sample_sdf;
 
@@ -129,6 +136,29 @@ TEST_P(Format, BrokenFilesAreRefusedWithTheirPlaceOrEdited) {
   EXPECT_GT(read, 30);
 }
 
+TEST_P(Format, WhatWouldLeaveNoBodyIsSaidAndNotWritten) {
+  const std::string text = sample_of(GetParam());
+  SimulatorChange damping = change({"damping"});
+  damping.damping = {-10.0, -10.0};
+  const EditedSimulator still = edited(GetParam(), text, damping);
+  ASSERT_EQ(still.not_expressed.size(), 2U);
+  EXPECT_THAT(still.not_expressed[0].why, HasSubstr("below 0"));
+  // The file has 0 now: there is nothing left to take.
+  EXPECT_EQ(edited(GetParam(), still.text, damping).text, still.text);
+
+  SimulatorChange mass = change({"mass"}), moment = change({"yaw_inertia"});
+  mass.mass = -100.0;
+  moment.yaw_inertia = -100.0;
+  for (const auto& [wanted, why] :
+       {std::pair{mass, "would have a mass of"}, std::pair{moment, "would have a moment of"}}) {
+    const EditedSimulator out = edited(GetParam(), text, wanted);
+    EXPECT_EQ(out.text, text);
+    ASSERT_EQ(out.not_expressed.size(), 1U);
+    EXPECT_THAT(out.not_expressed[0].why, HasSubstr(why));
+    EXPECT_EQ(out.not_expressed[0].cause, "a_cause");
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, Format,
                          ::testing::Values(SimulatorFormat::mjcf, SimulatorFormat::urdf, SimulatorFormat::sdf),
                          [](const auto& tested) { return std::string(name_of(tested.param)); });
@@ -164,6 +194,138 @@ TEST(Mjcf, WhatMakesOtherBodiesIsRefused) {
         << now;
   }
   EXPECT_THROW(static_cast<void>(edited(SimulatorFormat::mjcf, "<robot name=\"a\"/>", {})), InputError);
+}
+
+TEST(Mjcf, BrokenNumbersAreRefusedAndNamed) {
+  const auto error = [](const std::string& old, const std::string& now) {
+    return input_error([&] { static_cast<void>(open_mjcf(replaced(sample_mjcf, old, now), "robot.xml")); });
+  };
+  EXPECT_THAT(error("angle=\"degree\"", "eulerseq=\"xyw\""),
+              AllOf(HasSubstr("eulerseq"), HasSubstr("expected three of")));
+  EXPECT_THAT(error("euler=\"-90 0 0\"", "quat=\"0 0 0 0\""), HasSubstr("quat of length 0"));
+  EXPECT_THAT(error("zaxis=\"0 1 0\"", "zaxis=\"0 0 0\""), HasSubstr("a direction of length 0"));
+  EXPECT_THAT(error("zaxis=\"0 1 0\"", "xyaxes=\"1 0 0 2 0 0\""), HasSubstr("a direction of length 0"));
+  EXPECT_THAT(error("<geom class=\"wheel\"/>", "<geom class=\"wheel\" fromto=\"0 0 1 0 0 1\"/>"),
+              HasSubstr("fromto of length 0"));
+  EXPECT_THAT(error("<joint name=\"left\" />", "<joint name=\"left\" axis=\"0 0 0\"/>"), HasSubstr("axis of length 0"));
+  std::string chain;
+  for (int k = 0; k < 202; ++k) {
+    chain = "<body>" + chain + "</body>";
+  }
+  EXPECT_THAT(error("<freejoint/>", "<freejoint/>" + chain), HasSubstr("robot.xml:"));
+}
+
+TEST(Mjcf, AnOrientationMayBeWrittenAnyhow) {
+  // What the frames of wheels and inertial say is what is edited: moved wheels, and moments in the inertial's frame.
+  SimulatorChange wanted = change({"yaw_inertia", "moment_left", "track_factor"});
+  wanted.yaw_inertia = 0.3;
+  wanted.moment_left = 0.4;
+  wanted.track_factor = 1.5;
+  const std::string wheel = "euler=\"-90 0 0\"", inertial = "quat=\"0.9659258262890683 0.25881904510252074 0 0\"";
+  const std::string expected = edited(SimulatorFormat::mjcf, sample_mjcf, wanted).text;
+  for (const std::string way : {"quat=\"2 -2 0 0\"", "axisangle=\"1 0 0 -90\"", "axisangle=\"-3 0 0 90\"",
+                                "xyaxes=\"1 0 0 0 0 -1\"", "xyaxes=\"2 0 0 1 0 -1\""}) {
+    EXPECT_EQ(edited(SimulatorFormat::mjcf, replaced(sample_mjcf, wheel, way), wanted).text,
+              replaced(expected, wheel, way));
+  }
+  const double half = std::sqrt(0.75);
+  for (const std::string& way : {std::string("axisangle=\"2 0 0 30\""), std::string("euler=\"30 0 0\""),
+                                 fmt::format("xyaxes=\"1 0 0 0 {:.17g} 0.5\"", half)}) {
+    EXPECT_EQ(edited(SimulatorFormat::mjcf, replaced(sample_mjcf, inertial, way), wanted).text,
+              replaced(expected, inertial, way));
+  }
+}
+
+// Mass, centre and moments as sums over a lattice of points inside the shape.
+TEST(Mjcf, GeomsWeighWhatTheirShapeHolds) {
+  using Point = Eigen::Vector3d;
+  struct Case {
+    std::string geom;
+    std::function<bool(const Point&)> inside;
+  };
+  const auto ring = [](const Point& p) { return std::hypot(p.x(), p.y()); };
+  const Eigen::Vector3d from(0.1, 0.0, -0.2), to(0.3, 0.2, 0.1), along = (to - from).normalized();
+  const auto by_line = [&](const Point& p) {  // along and across the line from `from` to `to`
+    const Point d = p - 0.5 * (from + to);
+    return std::pair{std::abs(d.dot(along)), (d - d.dot(along) * along).norm()};
+  };
+  const double reach = 0.5 * (to - from).norm();
+  const std::string ends = "fromto=\"0.1 0 -0.2 0.3 0.2 0.1\"";
+  const std::vector<Case> cases = {
+      {"type=\"sphere\" size=\"0.3\"", [](const Point& p) { return p.norm() < 0.3; }},
+      {"type=\"box\" size=\"0.3 0.2 0.1\"",
+       [](const Point& p) { return std::abs(p.x()) < 0.3 && std::abs(p.y()) < 0.2 && std::abs(p.z()) < 0.1; }},
+      {"type=\"cylinder\" size=\"0.2 0.3\"", [&](const Point& p) { return ring(p) < 0.2 && std::abs(p.z()) < 0.3; }},
+      {"type=\"capsule\" size=\"0.2 0.15\"",
+       [&](const Point& p) { return std::hypot(ring(p), std::max(std::abs(p.z()) - 0.15, 0.0)) < 0.2; }},
+      {"type=\"ellipsoid\" size=\"0.3 0.2 0.1\"",
+       [](const Point& p) { return Point(p.x() / 0.3, p.y() / 0.2, p.z() / 0.1).norm() < 1.0; }},
+      {"type=\"cylinder\" size=\"0.15\" " + ends,
+       [&](const Point& p) { return by_line(p).first < reach && by_line(p).second < 0.15; }},
+      {"type=\"capsule\" size=\"0.1\" " + ends,
+       [&](const Point& p) { return std::hypot(std::max(by_line(p).first - reach, 0.0), by_line(p).second) < 0.1; }},
+      {"type=\"ellipsoid\" size=\"0.15\" " + ends,
+       [&](const Point& p) { return std::hypot(by_line(p).first / reach, by_line(p).second / 0.15) < 1.0; }}};
+  std::string bare = replaced(
+      sample_mjcf, "<inertial pos=\"0.02 0 0.05\" quat=\"0.9659258262890683 0.25881904510252074 0 0\"", "<site");
+  bare = replaced(bare, "mass=\"12\" diaginertia=\"0.3 0.35 0.4\"/>", "/>");
+  for (const char* castor : {"pos=\"0.2 0 -0.07\"", "pos=\"-0.2 0 -0.07\""}) {
+    bare = replaced(bare, castor, std::string(castor) + " mass=\"0\"");
+  }
+  for (const Case& one : cases) {
+    const auto document = open_mjcf(replaced(bare, "<geom type=\"box\" size=\"0.25 0.15 0.05\" pos=\"0 0 0.08\"",
+                                             "<geom density=\"800\" " + one.geom),
+                                    "robot.xml");
+    const TreeLink* const body = document->tree().link("chassis");
+    ASSERT_TRUE(body != nullptr && body->inertial.has_value()) << one.geom;
+    constexpr double cell = 0.01;
+    double mass = 0.0;
+    Point first = Point::Zero();
+    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+    for (double x = -0.5; x < 0.5; x += cell) {
+      for (double y = -0.5; y < 0.5; y += cell) {
+        for (double z = -0.5; z < 0.5; z += cell) {
+          if (const Point p = Point(x, y, z) + 0.5 * Point::Constant(cell); one.inside(p)) {
+            mass += 800.0 * cell * cell * cell;
+            first += 800.0 * cell * cell * cell * p;
+            second += 800.0 * cell * cell * cell * (p * p.transpose());
+          }
+        }
+      }
+    }
+    const Point centre = first / mass;
+    const Eigen::Matrix3d about = second - mass * centre * centre.transpose();
+    const Eigen::Matrix3d tensor = about.trace() * Eigen::Matrix3d::Identity() - about;
+    EXPECT_NEAR(body->inertial->mass / mass, 1.0, 0.02) << one.geom;
+    EXPECT_LT((body->inertial->centre - centre).norm(), 0.002) << one.geom;
+    EXPECT_LT((body->inertial->tensor - tensor).norm(), 0.03 * tensor.norm()) << one.geom;
+  }
+}
+
+TEST(Mjcf, GainsAreScaledInEveryActuator) {
+  SimulatorChange wanted = change({"gain"});
+  wanted.gain = {1.0, 0.5};  // of the left wheel
+  for (const auto& [before, after] : std::initializer_list<std::pair<std::string, std::string>>{
+           {"<velocity name=\"l\" joint=\"left\" kv=\"8\"/>", "<velocity name=\"l\" joint=\"left\" kv=\"4\"/>"},
+           {"<velocity name=\"l\" joint=\"left\"/>", "<velocity name=\"l\" joint=\"left\" kv=\"0.5\"/>"},
+           {"<position name=\"l\" joint=\"left\" kp=\"8\" kv=\"2\"/>",
+            "<position name=\"l\" joint=\"left\" kp=\"4\" kv=\"1\"/>"},
+           {"<general name=\"l\" joint=\"left\" gainprm=\"8\" biastype=\"affine\" biasprm=\"1 -4 -2\"/>",
+            "<general name=\"l\" joint=\"left\" gainprm=\"4\" biastype=\"affine\" biasprm=\"0.5 -2 -1\"/>"}}) {
+    const std::string motor = "<motor name=\"l\" joint=\"left\"/>";
+    const EditedSimulator out = edited(SimulatorFormat::mjcf, replaced(sample_mjcf, motor, before), wanted);
+    EXPECT_EQ(out.text, replaced(sample_mjcf, motor, after));
+    EXPECT_TRUE(out.not_expressed.empty());
+  }
+}
+
+TEST(Mjcf, AWheelThatIsAnEllipsoidRollsOnItsTwoEqualAxes) {
+  SimulatorChange wanted = change({"radius_factor"});
+  wanted.radius_factor = {1.0, 1.5};
+  const std::string text =
+      replaced(sample_mjcf, "<geom/>", "<geom type=\"ellipsoid\" size=\"0.1 0.1 0.02\" mass=\"1\"/>");
+  const std::string out = edited(SimulatorFormat::mjcf, text, wanted).text;
+  EXPECT_NE(out.find("size=\"0.15 0.15 0.02\""), std::string::npos) << out;
 }
 
 TEST(Mjcf, MassesThatTheEngineMakesAreNotWritten) {
@@ -223,6 +385,36 @@ TEST(Urdf, WheelsGrowAndMoveApart) {
   EXPECT_NEAR(line.middle.z(), sample.radius + 0.02 * sample.radius, 1e-8) << "the wheels stay on the ground";
 }
 
+TEST(Urdf, ARotorThatLeavesNoWheelIsSaid) {
+  SimulatorChange wanted = change({"armature"});
+  wanted.armature = {-1.0, 0.0};
+  const std::string text = sample_of(SimulatorFormat::urdf);
+  const EditedSimulator out = edited(SimulatorFormat::urdf, text, wanted);
+  EXPECT_EQ(out.text, text);
+  ASSERT_EQ(out.not_expressed.size(), 1U);
+  EXPECT_THAT(out.not_expressed[0].why, AllOf(HasSubstr("right_wheel"), HasSubstr("would be no body's inertia")));
+}
+
+// Of a file in which every link has a mass.
+TEST(Urdf, AnotherMassThanTheRobotFilesIsSaid) {
+  const testing::SampleRobot sample;
+  std::string text = replaced(sample_of(SimulatorFormat::urdf), "<link name=\"base_footprint\"/>\n", "");
+  const std::size_t joint = text.find("<joint name=\"base_joint\"");
+  text.erase(joint, text.find('\n', joint) + 1 - joint);
+  Robot own;
+  own.wheel_radius = sample.radius;
+  own.track_width = sample.track;
+  for (const double factor : {1.0, 1.1, 0.9}) {
+    own.nominal["mass"] = factor * (sample.mass() + sample.spin() / (sample.radius * sample.radius));
+    const EditedSimulator out = edit_simulator(SimulatorFormat::urdf, text, "robot.urdf", {}, own);
+    if (factor == 1.0) {
+      EXPECT_THAT(out.remarks, ::testing::IsEmpty());
+    } else {
+      EXPECT_THAT(out.remarks, ::testing::ElementsAre(HasSubstr("mass with the wheels' 2J/r²")));
+    }
+  }
+}
+
 TEST(Urdf, GainHasNoPlace) {
   SimulatorChange wanted = change({"gain"});
   wanted.gain = {0.8, 1.0};
@@ -262,6 +454,22 @@ TEST(Sdf, NumbersAreTextOfTheirElements) {
   EXPECT_NE(rest.find("<friction>0.25</friction>"), std::string::npos) << rest;
   EXPECT_NE(rest.find("<effort>7</effort>"), std::string::npos) << rest;
   static_cast<void>(edited(SimulatorFormat::sdf, out.text, {}));
+}
+
+TEST(Sdf, BrokenNumbersAreRefusedAndNamed) {
+  const auto error = [](const std::string& old, const std::string& now) {
+    return input_error([&] { static_cast<void>(open_sdf(replaced(sample_sdf, old, now), "robot.sdf")); });
+  };
+  EXPECT_THAT(error("<link name=\"chassis\">", "<model name=\"m\"/><link name=\"chassis\">"),
+              HasSubstr("a model inside a model"));
+  EXPECT_THAT(error("<parent>chassis</parent><child>left_wheel</child>", "<parent>chassis</parent>"),
+              HasSubstr("holds no <child>"));
+  EXPECT_THAT(error("<pose>0 0.2 0.1 -1.5707963267948966 0 0</pose>",
+                    "<pose rotation_format=\"quat_xyzw\">0 0.2 0.1 0 0 0 1</pose>"),
+              HasSubstr("has another rotation_format"));
+  EXPECT_THAT(error("relative_to=\"chassis\"", "relative_to=\"right_wheel\""), HasSubstr("relative to itself"));
+  EXPECT_THAT(error("<radius> 0.1 </radius>", "<radius>-0.1</radius>"), HasSubstr("expected metres, > 0"));
+  EXPECT_THAT(error("<xyz>0 0 1</xyz>", "<xyz>0 0 0</xyz>"), HasSubstr("a direction of length 0"));
 }
 
 TEST(Sdf, OneRobotAndNoIncludes) {
