@@ -62,7 +62,7 @@ int main(int count, char** arguments) try {
     return 2;
   }
   for (const auto& [name, run] : wheelwright::bench::benchmarks()) {
-    const auto wanted = [&](const std::string& word) { return name.find(word) != std::string::npos; };
+    const auto wanted = [&name = name](const std::string& word) { return name.find(word) != std::string::npos; };
     if (words.empty() || std::ranges::any_of(words, wanted)) {
       run(form);
     }
