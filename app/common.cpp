@@ -297,7 +297,7 @@ void make_directory(const CommonOptions& options, const std::vector<std::string>
         throw InputError(fmt::format("{}: is there already, {}: expected another --out, or --force to replace it",
                                      file.string(), other));
       }
-      if (other.empty()) {
+      if (other.empty() && std::ranges::count(place.left, name) == 0) {
         place.left.push_back(name);
       }
     }
@@ -380,7 +380,7 @@ void publish(const CommonOptions& options, const Json& result, const std::string
       names.push_back(entry.path().filename().string());
     }
     std::ranges::sort(names, {}, [&](const std::string& each) { return std::pair(each == name, each); });
-    ResultPlace* const place = place_of(options);
+    const ResultPlace* const place = place_of(options);
     std::vector<std::string> gone = place != nullptr ? place->left : std::vector<std::string>();
     std::erase_if(gone, [&](const std::string& each) { return std::ranges::count(names, each) > 0; });
     // Files one after another and without a break; before them what is written to as it is, which may wait for a reader.

@@ -217,8 +217,8 @@ int run(const Arguments& a) {
   };
   items.key = [&](std::size_t item) { return files.key(item); };
   // Where another process examined the robot, its first look was another one.
-  items.passing = [&](std::size_t item, std::string_view text) {
-    return results::record_from_text(text, "a robot").passing || !files.changed(item).empty();
+  items.passing = [&, ranks = launched_by_mpi()](std::size_t item, std::string_view text) {
+    return results::is_passing(text) || (ranks && !files.changed(item).empty());
   };
   items.agreed = [&](std::size_t item) { return name_and_paths(robots[item]); };
   items.plan = plan_of(a, own);

@@ -159,8 +159,10 @@ void write_beside(const Arguments& a, const Diagnosis& d, const gap::NextDrive& 
 }
 
 // Name of an edited file in the directory of results: robot_improved.xml of robot.xml.
+constexpr std::string_view kEdited = "_improved";
+
 std::string edited_name(const std::filesystem::path& source) {
-  return source.stem().string() + "_improved" + source.extension().string();
+  return source.stem().string() + std::string(kEdited) + source.extension().string();
 }
 
 // Names of the edited files that stand beside an earlier result.
@@ -170,8 +172,10 @@ std::vector<std::string> earlier_simulators(const std::filesystem::path& result)
     try {
       const Json json = files::read_json(result);
       for (const Json& simulator : json.at("simulators")) {
-        if (const Json& file = simulator.at("file"); file.is_string()) {
-          names.push_back(std::filesystem::path(file.get<std::string>()).filename().string());
+        const Json& file = simulator.at("file");
+        const std::filesystem::path edited = file.is_string() ? file.get<std::string>() : "";
+        if (edited.stem().string().ends_with(kEdited)) {
+          names.push_back(edited.filename().string());
         }
       }
     } catch (const std::exception&) {  // no result of this command: make_directory() says so
@@ -292,9 +296,8 @@ int run(const Arguments& a) {
       written.push_back(edited_name(simulator));
     }
   }
-  for (const std::string& file : earlier_simulators(a.common.out / "gap.json")) {
-    written.push_back(file);
-  }
+  const std::vector<std::string> earlier = earlier_simulators(a.common.out / "gap.json");
+  written.insert(written.end(), earlier.begin(), earlier.end());
   make_directory(a.common, written);
   Robot robot = read_robot(a.robot);
   const std::vector<SimulatorSource> sources = simulator_sources(a, robot);

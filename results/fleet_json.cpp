@@ -232,6 +232,8 @@ std::string record_text(const study::RobotRecord& record) {
   return files::json_text(json, -1);
 }
 
+bool is_passing(std::string_view record) { return record.find(R"("passing":true)") != std::string_view::npos; }
+
 study::RobotRecord record_from_text(std::string_view text, const std::string& where) {
   const Json json = files::parse_json(text, where);
   const JsonPlace at(json, where);

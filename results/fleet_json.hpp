@@ -19,6 +19,9 @@ inline constexpr const char* kFleetSchema = "wheelwright/fleet/1";
 /// its numbers are finite and its texts UTF-8.
 [[nodiscard]] std::string record_text(const study::RobotRecord& record);
 
+/// RobotRecord::passing of what record_text() wrote, without reading the rest.
+[[nodiscard]] bool is_passing(std::string_view record);
+
 /// Reads what record_text() wrote. Throws InputError, naming `where` and the key, for anything else.
 [[nodiscard]] study::RobotRecord record_from_text(std::string_view text, const std::string& where);
 

@@ -4,7 +4,7 @@
 
     check_alone.py [FOLDER...]    folders of this repository (bounds, app, tests/logs, ...); without one all of them
 
-The commands are those of the preset `debug`, which is configured where it is not yet; headers that are made are those of
+The commands are those of the preset `debug`, which is configured first; headers that are made are those of
 build/. Nothing is built. Warnings are errors, as in every build. Exit code 1 where a file does not compile, with the first messages of
 each. All of them take two processors ten minutes.
 """
@@ -32,9 +32,8 @@ def compiler():
 
 
 def commands(folders):
-    if not (BUILD / "compile_commands.json").exists():
-        subprocess.run(["cmake", "--preset", "debug", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON"], cwd=ROOT, check=True,
-                       stdout=subprocess.DEVNULL)
+    subprocess.run(["cmake", "--preset", "debug", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON"], cwd=ROOT, check=True,
+                   stdout=subprocess.DEVNULL)
     wanted, seen = [], set()
     for entry in json.loads((BUILD / "compile_commands.json").read_text(encoding="utf-8")):
         file = Path(entry["file"])

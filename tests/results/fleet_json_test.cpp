@@ -59,6 +59,15 @@ TEST(FleetJson, RecordsComeBackExactly) {
   EXPECT_EQ(record_text(record_from_text(text, "here")), text);
 }
 
+TEST(FleetJson, APassingRecordIsKnownWithoutReadingIt) {
+  study::RobotRecord record = full_record();
+  EXPECT_TRUE(is_passing(record_text(record)));
+  record.passing = false;
+  record.robot = R"("passing":true)";
+  record.notes = {R"({"passing":true})"};
+  EXPECT_FALSE(is_passing(record_text(record)));
+}
+
 TEST(FleetJson, AnythingElseIsAnError) {
   EXPECT_NE(testing::input_error([] { (void)record_from_text("{}", "store: item 3"); }).find("store: item 3"),
             std::string::npos);
