@@ -232,7 +232,7 @@ struct ResultPlace {
   std::filesystem::path out;
   std::string result;             // name of the command's result
   std::vector<std::string> left;  // names of what an earlier run of the command left
-  std::unique_ptr<files::DirectoryLock> lock;
+  std::unique_ptr<files::PathLock> lock;
 };
 
 std::vector<ResultPlace>& result_places() {
@@ -262,11 +262,11 @@ void create_out(const CommonOptions& options) {
   }
 }
 
-std::unique_ptr<files::DirectoryLock> locked(const CommonOptions& options, files::DirectoryLock::Kind kind) {
-  auto lock = std::make_unique<files::DirectoryLock>(options.out, kind);
+std::unique_ptr<files::PathLock> locked(const CommonOptions& options, files::PathLock::Kind kind) {
+  auto lock = std::make_unique<files::PathLock>(options.out, kind);
   while (lock->gone()) {  // a run that failed removed what it had made
     create_out(options);
-    lock = std::make_unique<files::DirectoryLock>(options.out, kind);
+    lock = std::make_unique<files::PathLock>(options.out, kind);
   }
   if (lock->taken()) {
     throw InputError("--out " + options.out.string() +
@@ -277,8 +277,7 @@ std::unique_ptr<files::DirectoryLock> locked(const CommonOptions& options, files
 
 }  // namespace
 
-void make_directory(const CommonOptions& options, const std::vector<std::string>& files,
-                    files::DirectoryLock::Kind lock) {
+void make_directory(const CommonOptions& options, const std::vector<std::string>& files, files::PathLock::Kind lock) {
   if (options.out.empty()) {
     return;
   }

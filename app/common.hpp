@@ -127,7 +127,7 @@ void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesy
 /// then what else it writes, which is its own where it is not younger than that. Where there are any, `out` is locked
 /// until the program ends: InputError where another one writes results into it, unless both share it.
 void make_directory(const CommonOptions& options, const std::vector<std::string>& files = {},
-                    files::DirectoryLock::Kind lock = files::DirectoryLock::Kind::alone);
+                    files::PathLock::Kind lock = files::PathLock::Kind::alone);
 /// Removes what make_directory() made and nothing was put into: a run that failed leaves no empty directories.
 void remove_empty_directories();
 

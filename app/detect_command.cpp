@@ -126,14 +126,11 @@ int run(const Arguments& a) {
   logs::LogOptions reader = reader_options(a.common);
   reader.only = robots::useful_columns(model.robot);
   if (a.follow) {
-    FollowOptions how{.json = a.common.json, .heartbeat = a.heartbeat, .events = {}};
+    FollowOptions how{.json = a.common.json, .heartbeat = a.heartbeat, .events = {}, .fresh = a.common.force};
     if (!a.common.out.empty()) {
       make_directory(a.common);
       how.events = a.common.out / "events.jsonl";
       keep_existing(a.common, how.events, kEventsSchema);
-      if (a.common.force) {
-        std::filesystem::remove(how.events);
-      }
     }
     return follow(STDIN_FILENO, std::move(detector), model, a.detector, reader, how);
   }

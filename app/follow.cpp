@@ -26,6 +26,7 @@
 #include <wheelwright/commission/incident_watch.hpp>
 #include <wheelwright/commission/risk_watch.hpp>
 #include <wheelwright/files/bytes.hpp>
+#include <wheelwright/files/temporary.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/csv.hpp>
 
@@ -62,17 +63,25 @@ std::optional<std::vector<std::size_t>> pick_columns(const logs::CsvRowParser& p
 // A file of lines to which each run appends: whatever ends a run, it holds whole lines.
 class LineFile {
  public:
-  /// Cuts off what a run that was killed, or a full disk, left of its last line.
-  explicit LineFile(std::filesystem::path path) : path_(std::move(path)) {
+  /// Cuts off what a run that was killed, or a full disk, left of its last line; everything where it is to be `fresh`.
+  /// Throws InputError where another run has the file.
+  LineFile(std::filesystem::path path, bool fresh) : path_(std::move(path)) {
+    if (fresh) {
+      take();
+      std::filesystem::remove(path_);
+    }
+    do {
+      file_ = std::ofstream(path_, std::ios::app | std::ios::binary);
+      take();
+    } while (lock_->gone());
     std::error_code error;
     size_ = std::filesystem::file_size(path_, error);
     if (error) {
       size_ = 0;
     } else if (const std::uintmax_t whole = whole_lines(); whole < size_) {
       size_ = whole;
-      cut();
+      std::filesystem::resize_file(path_, size_, error);
     }
-    file_.open(path_, std::ios::app | std::ios::binary);
   }
 
   /// Appends `line` and its end. Throws InputError where the file cannot take all of it.
@@ -89,6 +98,14 @@ class LineFile {
   }
 
  private:
+  void take() {
+    lock_.reset();
+    lock_ = std::make_unique<files::PathLock>(path_, files::PathLock::Kind::alone);
+    if (lock_->taken()) {
+      throw InputError(path_.string() +
+                       ": another run is writing into it: wait until that has ended, or choose another --out");
+    }
+  }
   // Bytes up to the end of the last whole line.
   [[nodiscard]] std::uintmax_t whole_lines() const {
     std::ifstream in(path_, std::ios::binary);
@@ -119,6 +136,7 @@ class LineFile {
   }
 
   std::filesystem::path path_;
+  std::unique_ptr<files::PathLock> lock_;
   std::ofstream file_;
   std::uintmax_t size_ = 0;
 };
@@ -128,7 +146,7 @@ class Teller {
  public:
   explicit Teller(const FollowOptions& how) : json_(how.json) {
     if (!how.events.empty()) {
-      file_.emplace(how.events);
+      file_.emplace(how.events, how.fresh);
     }
   }
 

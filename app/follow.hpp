@@ -20,11 +20,12 @@ struct FollowOptions {
   bool json = false;             ///< one JSON object a line in place of text
   double heartbeat = 0.0;        ///< s of the rows' clock between lines that say it is watching; 0: none
   std::filesystem::path events;  ///< JSON lines are appended to this file, too; empty: none
+  bool fresh = false;            ///< what `events` holds is dropped before
 };
 
 /// Reads CSV rows from the open descriptor `stream`, which messages call standard input, until its end and writes an
 /// event to standard output at the instant its alarm is raised: a line of text, or one JSON object a line. A row that cannot be used
-/// is told on standard error and left out. Throws InputError where FollowOptions::events cannot be written, OutputLost where
+/// is told on standard error and left out. Throws InputError where FollowOptions::events cannot be written or is another run's, OutputLost where
 /// standard output cannot.
 /// Returns kDone, kNo where there was an event, or kBadInput where the torque residual was not decided at any row, at
 /// none of the last ones, or at less than half of all, with the reason on standard error: a spell without decisions (commission::BlindWatch) is

@@ -147,8 +147,8 @@ std::optional<study::Shard> shard_of(std::string_view text) {
   return shard;
 }
 
-files::DirectoryLock::Kind lock_for(const ScaleOptions& scale) {
-  using enum files::DirectoryLock::Kind;
+files::PathLock::Kind lock_for(const ScaleOptions& scale) {
+  using enum files::PathLock::Kind;
   return scale.shard || launched_by_mpi() ? shared : alone;
 }
 

@@ -61,7 +61,7 @@ struct ItemsRun {
                                  const std::function<void(std::size_t done, std::size_t items)>& progress = {});
 
 /// How `out` is locked (make_directory()): shards and processes of one mpirun share it.
-[[nodiscard]] files::DirectoryLock::Kind lock_for(const ScaleOptions& scale);
+[[nodiscard]] files::PathLock::Kind lock_for(const ScaleOptions& scale);
 
 /// True if this process is one of several that mpirun or srun started together, by the environment they set; MPI itself
 /// is not asked, so that a plain run never starts it. False where that says that there is one alone.

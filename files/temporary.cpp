@@ -168,19 +168,23 @@ std::string Temporary::move_to(const fs::path& place) {
   return sync_directory(place.parent_path());
 }
 
-DirectoryLock::DirectoryLock(const fs::path& directory, Kind kind)
-    : descriptor_(open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+PathLock::PathLock(const fs::path& path, Kind kind) {
+  std::error_code none;
+  if (!fs::is_directory(path, none) && !fs::is_regular_file(path, none)) {
+    return;  // to open a pipe or a device can do something
+  }
+  descriptor_ = open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   taken_ = descriptor_ >= 0 && flock(descriptor_, (kind == Kind::alone ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0 &&
            errno == EWOULDBLOCK;
 }
 
-DirectoryLock::~DirectoryLock() {
+PathLock::~PathLock() {
   if (descriptor_ >= 0) {
     close(descriptor_);
   }
 }
 
-bool DirectoryLock::gone() const {
+bool PathLock::gone() const {
   struct stat here {};
   return descriptor_ >= 0 && fstat(descriptor_, &here) == 0 && here.st_nlink == 0;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Files and directories that are there for a while: gone with their object, with the program that is interrupted, or,
-/// where it was killed, with the next one of their name or beside it. Locks of directories, which leave nothing behind.
+/// where it was killed, with the next one of their name or beside it. Locks of what is there, which leave nothing behind.
 #pragma once
 
 #include <filesystem>
@@ -35,19 +35,20 @@ class Temporary {
   int lock_ = -1;               ///< descriptor that holds the lock
 };
 
-/// A lock of a directory, for programs that would put files of one name into it. It ends with the object or the process,
-/// and leaves nothing behind.
-class DirectoryLock {
+/// A lock of a directory, for programs that would put files of one name into it, or of a file that they would append to.
+/// It ends with the object or the process, and leaves nothing behind.
+class PathLock {
  public:
   enum class Kind { alone, shared };
 
   /// Takes the lock, or finds that it is taken; waits for nobody.
-  DirectoryLock(const std::filesystem::path& directory, Kind kind);
-  ~DirectoryLock();
-  DirectoryLock(const DirectoryLock&) = delete;
-  DirectoryLock& operator=(const DirectoryLock&) = delete;
+  PathLock(const std::filesystem::path& path, Kind kind);
+  ~PathLock();
+  PathLock(const PathLock&) = delete;
+  PathLock& operator=(const PathLock&) = delete;
 
-  /// True where another holds the lock. False also where the file system knows no locks, or the directory may not be read.
+  /// True where another holds the lock. False also where the file system knows no locks, where `path` is neither a file
+  /// nor a directory, or may not be read.
   [[nodiscard]] bool taken() const { return taken_; }
   /// True where what is locked was removed before it was.
   [[nodiscard]] bool gone() const;

@@ -128,6 +128,7 @@ class Chooser {
     for (std::size_t k = 0; k < topics_.size(); ++k) {
       offer_from(k);
     }
+    leave_other_axes();
     take_offers();
     order_sources();
     return std::move(choice_);
@@ -350,6 +351,35 @@ class Chooser {
                               word, core::listed(of_side, " and ")));
       }
     }
+  }
+
+  /// Beside wheels a topic with one joint is a gripper, an arm, a camera: its rows are no reason to interpolate wheels.
+  void leave_other_axes() {
+    const auto wheels = [&](std::string_view side) {
+      return std::ranges::any_of(offers_, [&](const Offer& offer) { return offer.column.name.ends_with(side); });
+    };
+    if (options_.only || !wheels("_r") || !wheels("_l")) {
+      return;
+    }
+    std::map<std::size_t, const Offer*> left;
+    const auto axis = [](const Offer& offer) {
+      const std::string& name = offer.column.name;
+      return name == "position" || name == "velocity" || name == "effort";
+    };
+    for (const Offer& offer : offers_) {
+      const bool used =
+          std::ranges::any_of(offers_, [&](const Offer& other) { return other.topic == offer.topic && !axis(other); });
+      if (axis(offer) && !used) {
+        left.try_emplace(offer.topic, &offer);
+      }
+    }
+    for (const auto& [k, first] : left) {
+      const BagColumn& column = first->column;
+      choice_.notes.push_back(
+          fmt::format("{} is of one axis, by its name no wheel, and was left out: --map {}={}.{} takes it",
+                      topic(k).name, column.name, topic(k).name, column.fields.front()));
+    }
+    std::erase_if(offers_, axis);
   }
 
   void take_offers() {

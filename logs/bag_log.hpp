@@ -91,7 +91,8 @@ struct BagTopicView {
 /// quaternion; *FACTOR behind it multiplies it. Else:
 /// - sensor_msgs/JointState: the joints that are named right and left (of those named wheel, where there are any; no
 ///   casters) give phi, omega and tau; of several wheels a side the mean of the motion and the sum of the efforts; a
-///   topic with one joint gives position, velocity and effort, too, and its own name may tell the side;
+///   topic with one joint gives position, velocity and effort, too, and its own name may tell the side; where others
+///   give columns of right and left wheels, and none is asked for by name, those of an axis are left out and reported;
 /// - geometry_msgs/PoseStamped and PoseWithCovarianceStamped, else nav_msgs/Odometry, give x, y and theta; an Odometry
 ///   topic whose name says that it comes from the wheels is left out, since that is no independent measurement;
 /// - sensor_msgs/Imu gives gyro_z and accel_x;

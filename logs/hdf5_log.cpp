@@ -119,6 +119,19 @@ std::uint64_t size_of(hid_t file) {
   return H5Fget_filesize(file, &size) < 0 ? 0 : size;
 }
 
+/// Why values packed by a shuffle are not read: bytes come back in order where it knows the size of an element, which the
+/// library always gives it, and the library asks nobody whether the file has another.
+std::string shuffle_defect(hid_t how, std::size_t width) {
+  std::array<unsigned, 1> parameter{};
+  std::size_t parameters = parameter.size();
+  unsigned flags = 0, configuration = 0;
+  const bool shuffled = H5Pget_filter_by_id2(how, H5Z_FILTER_SHUFFLE, &flags, &parameters, parameter.data(), 0, nullptr,
+                                             &configuration) >= 0;
+  return shuffled && parameter[0] != width
+             ? fmt::format("has values of {} bytes, shuffled as such of {}: the file is damaged", width, parameter[0])
+             : "";
+}
+
 /// Why a dataset is not read: what it says of its place is followed with trust only, and its size must be one that a
 /// log has. `chunk` becomes the bytes of a chunk.
 std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t& chunk) {
@@ -136,6 +149,9 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t
   const std::size_t width = H5Tget_size(type);
   if (width == 0) {
     return "has values of no bytes: expected numbers";
+  }
+  if (std::string defect = shuffle_defect(how.get(), width); !defect.empty()) {
+    return defect;
   }
   hsize_t piece = 0;
   if (layout == H5D_CHUNKED && (H5Pget_chunk(how.get(), 1, &piece) != 1 || piece > largest_chunk / width)) {
@@ -156,6 +172,25 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t
     return fmt::format("has {} values, none of which was written", rows);
   }
   return {};
+}
+
+/// The first row of a dataset in chunks whose chunk does not stand in the file; the library reads it as zeros. Nothing
+/// where all do.
+std::optional<hsize_t> first_unwritten(hid_t dataset, hsize_t rows) {
+  const Handle how(H5Dget_create_plist(dataset), H5Pclose);
+  hsize_t piece = 0;
+  if (H5Pget_layout(how.get()) != H5D_CHUNKED || H5Pget_chunk(how.get(), 1, &piece) != 1) {
+    return std::nullopt;
+  }
+  for (hsize_t row = 0; row < rows; row += piece) {
+    unsigned left_out = 0;
+    haddr_t place = HADDR_UNDEF;
+    hsize_t bytes = 0;
+    if (H5Dget_chunk_info_by_coord(dataset, &row, &left_out, &place, &bytes) < 0 || place == HADDR_UNDEF) {
+      return row;
+    }
+  }
+  return std::nullopt;
 }
 
 /// Lists what a dataset offers; `defect` says why it must not be opened.
@@ -191,8 +226,9 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
       // The library takes a member's place for granted.
       const bool inside =
           member && H5Tget_member_offset(type.get(), index) + H5Tget_size(member.get()) <= H5Tget_size(type.get());
-      if (inside && name != nullptr && is_number(member.get())) {
-        sources.push_back({path, name, "", rows, chunk, refused});
+      if (name != nullptr && (!inside || is_number(member.get()))) {
+        sources.push_back(
+            {path, name, "", rows, chunk, inside ? refused : "ends outside of its row: the file is damaged"});
       }
       H5free_memory(name);
     }
@@ -203,6 +239,7 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
 std::vector<Source> list_sources(hid_t file, const std::filesystem::path& name, bool trust) {
   struct Found {
     std::vector<std::pair<std::string, haddr_t>> datasets;
+    std::vector<Source> others;
     std::size_t objects = 0;
     bool too_deep = false;
   } found;
@@ -212,10 +249,17 @@ std::vector<Source> list_sources(hid_t file, const std::filesystem::path& name, 
     all.too_deep = std::ranges::count(path, '/') >= deepest_group;
     if (info->type == H5O_TYPE_DATASET) {
       all.datasets.emplace_back(fmt::format("/{}", path), info->addr);
+    } else if (info->type != H5O_TYPE_GROUP && recognise_log_column(path.substr(path.rfind('/') + 1)) != nullptr) {
+      all.others.push_back({fmt::format("/{}", path), "", "", 0, 0, "is no dataset: the file is damaged"});
     }
     return ++all.objects <= most_objects && !all.too_deep ? 0 : 1;
   };
-  H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, visit, &found, H5O_INFO_BASIC);
+  if (H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, visit, &found, H5O_INFO_BASIC) < 0) {
+    throw InputError(fmt::format(
+        "{}: is damaged: the HDF5 library lists {} datasets and finds no way to others: expected a whole HDF5 "
+        "file, closed by its writer",
+        name.string(), found.datasets.size()));
+  }
   if (found.too_deep || found.objects > most_objects) {
     throw InputError(fmt::format("{}: {}: expected a log, with at most {} objects in groups at most {} deep",
                                  name.string(),
@@ -229,7 +273,7 @@ std::vector<Source> list_sources(hid_t file, const std::filesystem::path& name, 
     throw InputError(name.string() + ": does not say how it is made: expected a whole HDF5 file");
   }
   mcap::WindowedFile bytes(name, false);
-  std::vector<Source> sources;
+  std::vector<Source> sources = std::move(found.others);
   for (const auto& [path, address] : found.datasets) {
     list_dataset(file, path, hdf5::header_defect(bytes, base + address, sizes), trust, sources);
   }
@@ -536,6 +580,9 @@ class Hdf5File final : public RowFile {
       if (name != "t") {
         names_.push_back(name);
       }
+      if (!options.trust) {
+        refuse_unwritten(file.get(), source);
+      }
     }
   }
 
@@ -547,6 +594,16 @@ class Hdf5File final : public RowFile {
   }
 
  private:
+  void refuse_unwritten(hid_t file, const Source& source) const {
+    const Handle dataset(H5Dopen2(file, source.path.c_str(), H5P_DEFAULT), H5Dclose);
+    if (const auto row = dataset ? first_unwritten(dataset.get(), source.rows) : std::nullopt) {
+      throw InputError(fmt::format(
+          "{}: {} has {} values, of which row {} and others were never written or are lost: expected a whole "
+          "log, or --trust, which takes what HDF5 puts in their place",
+          path_.string(), source.shown(), source.rows, *row + 1));
+    }
+  }
+
   std::filesystem::path path_;
   Choice choice_;
   std::vector<std::string> names_;

@@ -38,7 +38,8 @@ class UrdfDocument final : public SimulatorDocument {
   }
 
   [[nodiscard]] std::string why_no_mass(const TreeLink& link) const override {
-    return link.inertial ? "" : link.place.text() + " has no <inertial>";
+    // A link without shapes is a frame.
+    return link.inertial || link.shapes.empty() ? "" : link.place.text() + " has a shape and no <inertial>";
   }
 
   void set_inertial(const TreeLink& link, const TreeInertial& wanted) override {

@@ -116,7 +116,7 @@ TEST_F(Out, AnotherRunIsRefusedWhileOneWrites) {
       fmt::format("cd '{}' && timeout 60 '{}' doctor log.csv --robot robot.yaml --quiet --out out", directory_.string(),
                   WHEELWRIGHT_PROGRAM);
   std::thread first([&] { EXPECT_EQ(std::system(doctor.c_str()), 0); });
-  const auto locked = [&] { return files::DirectoryLock(path("out"), files::DirectoryLock::Kind::shared).taken(); };
+  const auto locked = [&] { return files::PathLock(path("out"), files::PathLock::Kind::shared).taken(); };
   for (int look = 0; look < 2000 && !locked(); ++look) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
@@ -141,13 +141,13 @@ TEST_F(Out, ShardsWriteIntoOneDirectoryAtOnce) {
   fs::copy_file(examples() / "healthy.csv.gz", path("robots/amy.csv.gz"));
   const std::string fleet = "fleet robots --robot robot.yaml --quiet --out out ";
   {
-    const files::DirectoryLock other(path("out"), files::DirectoryLock::Kind::shared);
+    const files::PathLock other(path("out"), files::PathLock::Kind::shared);
     EXPECT_EQ(run(fleet + "--shard 1/1").code, 0);
     EXPECT_THAT(run(fleet + "--merge").err, HasSubstr("another run is writing"));
     EXPECT_THAT(run(fleet).err, HasSubstr("another run is writing"));
   }
   EXPECT_LE(run(fleet + "--merge").code, 1);
-  const files::DirectoryLock other(path("out"), files::DirectoryLock::Kind::alone);
+  const files::PathLock other(path("out"), files::PathLock::Kind::alone);
   EXPECT_THAT(run(fleet + "--shard 1/1").err, HasSubstr("another run is writing"));
 }
 

@@ -8,6 +8,8 @@
 #include <functional>
 #include <thread>
 
+#include <wheelwright/files/temporary.hpp>
+
 #include "app/program.hpp"
 
 namespace wheelwright::app::robust_test {
@@ -359,6 +361,29 @@ TEST_F(Robust, TheFileOfEventsHoldsWholeLines) {
   put("watch/events.jsonl", R"({"schema":"wheelwright/events/1","soft)");
   EXPECT_EQ(run(follow, "log.csv").code, 0);
   EXPECT_EQ(Json::parse(testing::lines_of(bytes(path("watch/events.jsonl"))).front()).at("robot"), "example");
+}
+
+// Two at once cut each other's lines, and --force took the file from under the first.
+TEST_F(Robust, AFileOfEventsHasOneWriter) {
+  commission_shipped();
+  put_lines("log.csv", healthy_lines());
+  const std::string follow = "detect --follow --model model/model.json --heartbeat 30 --out watch";
+  EXPECT_EQ(run(follow, "log.csv").code, 0);
+  const std::string kept = bytes(path("watch/events.jsonl"));
+  {
+    const files::PathLock other(path("watch/events.jsonl"), files::PathLock::Kind::alone);
+    for (const char* const more : {"", " --force"}) {
+      const Outcome second = run(follow + more, "log.csv");
+      EXPECT_EQ(second.code, 2);
+      EXPECT_THAT(second.err,
+                  AllOf(HasSubstr("watch/events.jsonl: another run is writing"), HasSubstr("another --out")));
+      EXPECT_EQ(bytes(path("watch/events.jsonl")), kept);
+    }
+  }
+  EXPECT_EQ(run(follow + " --force", "log.csv").code, 0);
+  EXPECT_EQ(bytes(path("watch/events.jsonl")), kept);
+  EXPECT_EQ(run(follow, "log.csv").code, 0);
+  EXPECT_EQ(bytes(path("watch/events.jsonl")), kept + kept);
 }
 
 }  // namespace

@@ -189,28 +189,28 @@ TEST_F(Temporaries, ALinkStaysOneAndWhatItLeadsToIsReplaced) {
 }
 
 TEST_F(Temporaries, ADirectoryIsLockedForOneOrForThoseWhoShare) {
-  using Kind = DirectoryLock::Kind;
+  using Kind = PathLock::Kind;
   {
-    const DirectoryLock alone(directory_, Kind::alone);
+    const PathLock alone(directory_, Kind::alone);
     EXPECT_FALSE(alone.taken());
-    EXPECT_TRUE(DirectoryLock(directory_, Kind::alone).taken());
-    EXPECT_TRUE(DirectoryLock(directory_, Kind::shared).taken());
+    EXPECT_TRUE(PathLock(directory_, Kind::alone).taken());
+    EXPECT_TRUE(PathLock(directory_, Kind::shared).taken());
   }
   {
-    const DirectoryLock one(directory_, Kind::shared), other(directory_, Kind::shared);
+    const PathLock one(directory_, Kind::shared), other(directory_, Kind::shared);
     EXPECT_FALSE(one.taken() || other.taken());
-    EXPECT_TRUE(DirectoryLock(directory_, Kind::alone).taken());
+    EXPECT_TRUE(PathLock(directory_, Kind::alone).taken());
   }
-  killed_after([&] { new DirectoryLock(directory_, Kind::alone); });
-  EXPECT_FALSE(DirectoryLock(directory_, Kind::alone).taken());
+  killed_after([&] { new PathLock(directory_, Kind::alone); });
+  EXPECT_FALSE(PathLock(directory_, Kind::alone).taken());
   EXPECT_TRUE(names().empty());
 
   fs::create_directory(path("out"));
-  const DirectoryLock lost(path("out"), Kind::alone);
+  const PathLock lost(path("out"), Kind::alone);
   EXPECT_FALSE(lost.gone());
   fs::remove(path("out"));
   EXPECT_TRUE(lost.gone());
-  EXPECT_FALSE(DirectoryLock(path("out"), Kind::alone).taken()) << "what is not there has no lock";
+  EXPECT_FALSE(PathLock(path("out"), Kind::alone).taken()) << "what is not there has no lock";
 }
 
 TEST_F(Temporaries, ALineWithoutEndIsRefusedBeforeItFillsTheMemory) {

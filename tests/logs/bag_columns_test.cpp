@@ -133,6 +133,39 @@ TEST(BagColumns, OneJointIsAnAxis) {
                                   {"effort", "/axis.effort[slide]"}}));
 }
 
+// Rows were interpolated, and dropped, for the sake of a gripper.
+TEST(BagColumns, AJointBesideWheelsIsAskedForOrLeftOut) {
+  Bag bag;
+  bag.add("/joint_states", "sensor_msgs/msg/JointState", {"right_wheel", "left_wheel"}, {"velocity"});
+  bag.add("/gripper/joint_states", "sensor_msgs/msg/JointState", {"finger"}, all_arrays);
+  const Places wheels = {{"omega_r", "/joint_states.velocity[right_wheel]"},
+                         {"omega_l", "/joint_states.velocity[left_wheel]"}};
+  EXPECT_EQ(bag.places(), wheels);
+  EXPECT_THAT(bag.choose().notes,
+              ElementsAre(HasSubstr("/gripper/joint_states is of one axis, by its name no wheel, and was left out: "
+                                    "--map position=/gripper/joint_states.position[finger] takes it")));
+  CsvOptions options;
+  options.only = {"position"};
+  EXPECT_EQ(bag.places(options), (Places{{"position", "/gripper/joint_states.position[finger]"}}));
+  options.only.reset();
+  options.map["effort"] = "/gripper/joint_states.effort[finger]";
+  Places both = wheels;
+  both["effort"] = "/gripper/joint_states.effort[finger]";
+  EXPECT_EQ(bag.places(options), both);
+}
+
+TEST(BagColumns, WheelsWithATopicEachAreNoOtherAxes) {
+  Bag bag;
+  bag.add("/right_wheel", "sensor_msgs/msg/JointState", {"joint"}, {"velocity"});
+  EXPECT_EQ(bag.places(),
+            (Places{{"velocity", "/right_wheel.velocity[joint]"}, {"omega_r", "/right_wheel.velocity[joint]"}}))
+      << "a test stand of one wheel";
+  bag.add("/left_wheel", "sensor_msgs/msg/JointState", {"joint"}, {"velocity"});
+  EXPECT_EQ(bag.places(),
+            (Places{{"omega_r", "/right_wheel.velocity[joint]"}, {"omega_l", "/left_wheel.velocity[joint]"}}));
+  EXPECT_THAT(bag.choose().notes, IsEmpty());
+}
+
 TEST(BagColumns, APoseOfItsOwnGoesBeforeOdometryAndWheelOdometryIsLeftOut) {
   Bag bag;
   bag.add("/diff_drive_controller/odom", "nav_msgs/msg/Odometry");

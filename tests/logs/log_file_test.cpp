@@ -602,5 +602,78 @@ TEST_F(LogFile, ADatasetWithDamagedAttributesIsRefused) {
   }
 }
 
+// The library brings bytes back in order by the size that the file gives, and one changed bit made numbers of others.
+TEST_F(LogFile, ADatasetShuffledInAnotherSizeIsRefused) {
+  std::string content = bytes(write("whole.h5", drive()));
+  const std::size_t name = content.find("shuffle");
+  ASSERT_NE(name, std::string::npos);
+  ASSERT_EQ(content[name + 8], '\x08');
+  content[name + 8] = '\x48';
+  const auto file = put("damaged.h5", content);
+  EXPECT_THAT(input_error([&] { read({file}); }), HasSubstr("has values of 8 bytes, shuffled as such of 72"));
+}
+
+// Columns behind the damage were missing, and nothing was said.
+TEST_F(LogFile, AnHdf5FileThatCannotBeListedIsRefused) {
+  const std::string content = bytes(write("whole.h5", drive()));
+  const std::size_t members = content.rfind("SNOD");
+  ASSERT_NE(members, std::string::npos);
+  std::string damaged = content;
+  damaged[members + 8 + 40 + 8 + 4] = '\x01';  // of the second member the address, 4 GiB further on
+  const auto file = put("damaged.h5", damaged);
+  EXPECT_THAT(input_error([&] { read({file}); }),
+              AllOf(HasSubstr("damaged.h5: is damaged: the HDF5 library lists"), HasSubstr("finds no way to others")));
+  {
+    const hid_t opened = H5Fopen(write("type.h5", drive()).c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    H5Ldelete(opened, "/log/omega_r", H5P_DEFAULT);
+    const hid_t type = H5Tcopy(H5T_IEEE_F64LE);
+    EXPECT_GE(H5Tcommit2(opened, "/log/omega_r", type, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), 0);
+    H5Tclose(type);
+    H5Fclose(opened);
+  }
+  EXPECT_THAT(input_error([&] { read({path("type.h5")}); }), HasSubstr("/log/omega_r is no dataset"));
+}
+
+// What is not there is read as zeros.
+TEST_F(LogFile, PiecesOfHdf5ThatWereNeverWrittenAreRefused) {
+  const LogTable table = drive();
+  const hsize_t piece = 10, rows = table.t.size();
+  ASSERT_GT(rows, 3 * piece);
+  const auto make = [&](hsize_t left_out, hsize_t places) {
+    const hid_t file = H5Fcreate(path("a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t how = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(1, &rows, nullptr);
+    H5Pset_chunk(how, 1, &piece);
+    for (const char* const name : {"t", "omega_r"}) {
+      const std::vector<double>& values = std::string_view(name) == "t" ? table.t : table.column(name);
+      const hid_t data = H5Dcreate2(file, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, how, H5P_DEFAULT);
+      for (hsize_t first = 0; first < rows; first += piece) {
+        const hsize_t count = std::min(piece, rows - first);
+        const hid_t memory = H5Screate_simple(1, &count, nullptr);
+        H5Sselect_hyperslab(space, H5S_SELECT_SET, &first, nullptr, &count, nullptr);
+        if (name[0] == 't' || first < left_out || first >= left_out + places) {
+          EXPECT_GE(H5Dwrite(data, H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, values.data() + first), 0);
+        }
+        H5Sclose(memory);
+      }
+      H5Dclose(data);
+    }
+    H5Sclose(space);
+    H5Pclose(how);
+    H5Fclose(file);
+  };
+  make(0, 0);
+  EXPECT_EQ(read({path("a.h5")}).column("omega_r"), table.column("omega_r"));
+  for (const hsize_t left_out : {hsize_t{0}, 2 * piece, (rows - 1) / piece * piece}) {
+    make(left_out, piece);
+    EXPECT_THAT(
+        input_error([&] { read({path("a.h5")}); }),
+        AllOf(HasSubstr(fmt::format("a.h5: /omega_r has {} values, of which row {} and others", rows, left_out + 1)),
+              HasSubstr("--trust")));
+    LogOptions trust;
+    trust.trust = true;
+    EXPECT_EQ(read({path("a.h5")}, trust).column("omega_r").at(left_out), 0.0);
+  }
+}
+
 }  // namespace
 }  // namespace wheelwright::logs::log_file_test

@@ -395,23 +395,32 @@ TEST(Urdf, ARotorThatLeavesNoWheelIsSaid) {
   EXPECT_THAT(out.not_expressed[0].why, AllOf(HasSubstr("right_wheel"), HasSubstr("would be no body's inertia")));
 }
 
-// Of a file in which every link has a mass.
+// base_footprint, which most robots of ROS have, is a frame; a link with a shape has a mass that the file does not tell.
 TEST(Urdf, AnotherMassThanTheRobotFilesIsSaid) {
   const testing::SampleRobot sample;
-  std::string text = replaced(sample_of(SimulatorFormat::urdf), "<link name=\"base_footprint\"/>\n", "");
-  const std::size_t joint = text.find("<joint name=\"base_joint\"");
-  text.erase(joint, text.find('\n', joint) + 1 - joint);
+  const std::string with_frame = sample_of(SimulatorFormat::urdf), frame = "<link name=\"base_footprint\"/>\n";
+  const std::string with_shape =
+      replaced(with_frame, frame,
+               "<link name=\"base_footprint\"><visual><geometry><box size=\"1 1 1\"/></geometry></visual></link>\n");
+  std::string all_known = replaced(with_frame, frame, "");
+  const std::size_t joint = all_known.find("<joint name=\"base_joint\"");
+  all_known.erase(joint, all_known.find('\n', joint) + 1 - joint);
   Robot own;
   own.wheel_radius = sample.radius;
   own.track_width = sample.track;
   for (const double factor : {1.0, 1.1, 0.9}) {
     own.nominal["mass"] = factor * (sample.mass() + sample.spin() / (sample.radius * sample.radius));
-    const EditedSimulator out = edit_simulator(SimulatorFormat::urdf, text, "robot.urdf", {}, own);
-    if (factor == 1.0) {
-      EXPECT_THAT(out.remarks, ::testing::IsEmpty());
-    } else {
-      EXPECT_THAT(out.remarks, ::testing::ElementsAre(HasSubstr("mass with the wheels' 2J/r²")));
+    const auto remarks = [&](const std::string& text) {
+      return edit_simulator(SimulatorFormat::urdf, text, "robot.urdf", {}, own).remarks;
+    };
+    for (const std::string& text : {all_known, with_frame}) {
+      if (factor == 1.0) {
+        EXPECT_THAT(remarks(text), ::testing::IsEmpty());
+      } else {
+        EXPECT_THAT(remarks(text), ::testing::ElementsAre(HasSubstr("mass with the wheels' 2J/r²")));
+      }
     }
+    EXPECT_THAT(remarks(with_shape), ::testing::IsEmpty());
   }
 }
 

@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is read from a damaged recording is what a second reader, written apart, reads.
 
-    run.py PROGRAM SCRATCH [MUTATIONS] [SEED]
+    run.py PROGRAM SCRATCH [MUTATIONS] [SEED] [RECORDING...]
 
-Recordings of one topic /joint_states are written by the program and, without any checksum, by this script: MCAP and
-SQLite. Bytes of them are changed, erased, doubled and cut off. Where `convert` takes such a file, every row has to be
-a message of the file, as the reader of this script decodes it, with the distances in time of their stamps; where rows
-are fewer than messages that can be read, time goes backwards or is that of recording, that has to be said. Of recordings
+Recordings of a topic /joint_states are written by the program and, without any checksum, by this script: MCAP and
+SQLite, with speeds or angles, either order of bytes, other topics between; and HDF5 (hdf5.py). Bytes of them are
+changed, erased, doubled and cut off. Where `convert` takes such a file, every row has to be a message of the file, as
+the reader of this script decodes it, with the distances in time of their stamps; where rows are fewer than messages
+that can be read, columns are missing, time goes backwards or is that of recording, that has to be said. Of recordings
 with checksums every row has to be a message of the undamaged file, unless it is said to be read without one. What the
-second reader cannot judge (another message definition, packed chunks) is counted.
+second reader cannot judge (another message definition, packed chunks, unusual HDF5) is counted.
 """
 
 import csv
@@ -19,8 +20,12 @@ import sqlite3
 import struct
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
+import hdf5
+
+SPEEDS, ANGLES = ("omega_r", "omega_l", "tau_r", "tau_l"), ("phi_r", "phi_l", "tau_r", "tau_l")
 TOPIC, TYPE = "/joint_states", "sensor_msgs/msg/JointState"
 NAMES = ("right_wheel", "left_wheel")
 DEFINITION = """std_msgs/Header header
@@ -49,28 +54,28 @@ class Unreadable(Exception):
 # CDR of JointState, by hand.
 
 
-def encode(stamp_ns, velocity, effort):
-    data = bytearray(b"\x00\x01\x00\x00")
+def encode(stamp_ns, position, velocity, effort, order="<", names=NAMES):
+    data = bytearray([0, order == "<", 0, 0])
 
     def align(size):
         data.extend(b"\x00" * (-(len(data) - 4) % size))
 
     def text(value):
         align(4)
-        data.extend(struct.pack("<I", len(value) + 1) + value.encode() + b"\x00")
+        data.extend(struct.pack(order + "I", len(value) + 1) + value.encode() + b"\x00")
 
-    data.extend(struct.pack("<iI", stamp_ns // 10**9, stamp_ns % 10**9))
+    data.extend(struct.pack(order + "iI", stamp_ns // 10**9, stamp_ns % 10**9))
     text("")
     align(4)
-    data.extend(struct.pack("<I", len(NAMES)))
-    for name in NAMES:
+    data.extend(struct.pack(order + "I", len(names)))
+    for name in names:
         text(name)
-    for values in ((), velocity, effort):
+    for values in (position, velocity, effort):
         align(4)
-        data.extend(struct.pack("<I", len(values)))
+        data.extend(struct.pack(order + "I", len(values)))
         if values:
             align(8)
-            data.extend(struct.pack(f"<{len(values)}d", *values))
+            data.extend(struct.pack(f"{order}{len(values)}d", *values))
     return bytes(data)
 
 
@@ -100,7 +105,7 @@ class Cdr:
 
 
 def decode(data):
-    """(stamp in ns, omega_r, omega_l, tau_r, tau_l)"""
+    """(stamp in ns, what it has of phi, omega and tau by name)"""
     cdr = Cdr(data)
     seconds, nanoseconds = cdr.numbers("i")[0], cdr.numbers("I")[0]
     cdr.text()
@@ -114,12 +119,14 @@ def decode(data):
         if count > len(data):
             raise Unreadable
         arrays.append(cdr.numbers("d", count))
-    try:
-        right, left = (names.index(name.encode()) for name in NAMES)
-        values = (arrays[1][right], arrays[1][left], arrays[2][right], arrays[2][left])
-    except (ValueError, IndexError) as wrong:
-        raise Unreadable from wrong
-    return (seconds * 10**9 + nanoseconds, *values)
+    found = {}
+    for name, side in zip(NAMES, "rl"):
+        if name.encode() not in names:
+            raise Unreadable
+        at = names.index(name.encode())
+        found.update({f"{column}_{side}": values[at] for column, values in zip(("phi", "omega", "tau"), arrays)
+                      if at < len(values)})
+    return seconds * 10**9 + nanoseconds, found
 
 
 def decoded(messages):
@@ -144,11 +151,20 @@ def record(code, content):
     return struct.pack("<BQ", code, len(content)) + content
 
 
-def write_mcap(path, messages, chunked):
-    schema = record(3, struct.pack("<H", 1) + string(TYPE.encode()) + string(b"ros2msg") + string(DEFINITION.encode()))
-    channel = record(4, struct.pack("<HH", 1, 1) + string(TOPIC.encode()) + string(b"cdr") + struct.pack("<I", 0))
-    records = [record(5, struct.pack("<HIQQ", 1, k, stamp, stamp) + data) for k, (stamp, data) in enumerate(messages)]
-    content = [schema, channel]
+def write_mcap(path, messages, chunked, others=()):
+    """`others`: (topic, type, definition, data of a message that comes before each of `messages`)"""
+    content, between = [], []
+    for number, (topic, kind, definition, data) in enumerate(((TOPIC, TYPE, DEFINITION, b""), *others), 1):
+        content.append(record(3, struct.pack("<H", number) + string(kind.encode()) + string(b"ros2msg")
+                              + string(definition.encode())))
+        content.append(record(4, struct.pack("<HH", number, number) + string(topic.encode()) + string(b"cdr")
+                              + struct.pack("<I", 0)))
+        if data:
+            between.append((number, data))
+    records = []
+    for stamp, data in messages:
+        records.append(b"".join(record(5, struct.pack("<HIQQ", number, len(records), stamp, stamp) + message)
+                                for number, message in (*between, (1, data))))
     if chunked:
         for first in range(0, len(records), 20):
             inside, last = b"".join(records[first:first + 20]), min(first + 19, len(records) - 1)
@@ -227,7 +243,7 @@ def anywhere(path):
 # SQLite, through Python's own module.
 
 
-def write_db3(path, messages):
+def write_db3(path, messages, others=()):
     path.unlink(missing_ok=True)
     database = sqlite3.connect(path)
     database.executescript("""
@@ -240,7 +256,11 @@ def write_db3(path, messages):
         CREATE INDEX timestamp_idx ON messages (timestamp ASC);
         INSERT INTO schema VALUES (3, 'humble');""")
     database.execute("INSERT INTO topics VALUES (1, ?, ?, 'cdr', '')", (TOPIC, TYPE))
-    database.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (1, ?, ?)", messages)
+    for number, (topic, kind, _, _) in enumerate(others, 2):
+        database.execute("INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')", (number, topic, kind))
+    for stamp, data in messages:
+        for number, message in (*((number, other[3]) for number, other in enumerate(others, 2)), (1, data)):
+            database.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", (number, stamp, message))
     database.commit()
     database.close()
 
@@ -264,19 +284,44 @@ def read_db3(path):
 
 
 def rows_of(path):
+    """Names of columns behind the time, and rows of numbers with the time in front."""
     with path.open(encoding="utf-8") as file:
-        return [tuple(float(row[name]) if row[name] else math.nan for name in ("t", "omega_r", "omega_l", "tau_r", "tau_l"))
-                for row in csv.DictReader(line for line in file if line.strip())]
+        reader = csv.DictReader(line for line in file if line.strip())
+        rows = [tuple(float(value) if value else math.nan for value in row.values()) for row in reader]
+        return tuple(reader.fieldnames[1:]), rows
 
 
-def judge(rows, messages, readable, said):
-    """What is wrong, or None. `messages`: (stamp, values...); `readable` of them can be read, `said` is what was told."""
+def columns_of(read):
+    """Messages of columns, a row each."""
+    names = [name for name in read if name != "t"]
+    return [(round(t * 1e9), dict(zip(names, values))) for t, *values in zip(read["t"], *(read[name] for name in names))
+            if math.isfinite(t)]
+
+
+def key(names, values, said):
+    """What values have to be equal; of angles, once it is said that whole turns were undone, without those."""
+    turned = "by a whole turn undone" in said
+    return tuple(None if not math.isfinite(value)
+                 else round(value % (2 * math.pi) * 1e6) % round(2e6 * math.pi) if turned and name.startswith("phi") else value
+                 for name, value in zip(names, values))
+
+
+def judge(names, rows, messages, readable, said):
+    """What is wrong, or None. `messages`: (stamp, values by name); the first `readable` of them, as one reads on, stand
+    in rows; `said` is what was told."""
+    missing = [name for name in (messages[0][1] if readable else ()) if name not in names and name not in said
+               and all(name in values for _, values in messages[:readable])]
+    if missing:
+        return f"no column {missing}, and nothing was said"
+    readable = sum(all(name in values for name in names) for _, values in messages[:readable])
     stamps = {}
-    for stamp, *values in messages:
-        stamps.setdefault(tuple(value if math.isfinite(value) else None for value in values), set()).add(stamp)
+    for stamp, by_name in messages:
+        if not all(name in by_name for name in names):
+            continue
+        stamps.setdefault(key(names, (by_name[name] for name in names), said), set()).add(stamp)
     origins, before = None, -math.inf
     for k, (t, *values) in enumerate(rows):
-        here = {stamp - round(t * 1e9) for stamp in stamps.get(tuple(x if math.isfinite(x) else None for x in values), ())}
+        here = {stamp - round(t * 1e9) for stamp in stamps.get(key(names, values, said), ())}
         rounding = 2 + 2e9 * math.ulp(t)
         origins = here if origins is None else {a for a in origins if any(abs(a - b) <= rounding for b in here)}
         if not here:
@@ -326,36 +371,69 @@ def main():
     program, scratch = str(Path(sys.argv[1]).resolve()), Path(sys.argv[2])
     count = int(sys.argv[3]) if len(sys.argv) > 3 else 120
     seed = int(sys.argv[4]) if len(sys.argv) > 4 else 1
+    wanted = sys.argv[5:]
     scratch.mkdir(parents=True, exist_ok=True)
     draw = random.Random(seed)
-    truth = [(1_700_000_000 * 10**9 + k * 10_000_000, *(draw.uniform(-9.0, 9.0) for _ in range(4))) for k in range(ROWS)]
-    messages = [(stamp, encode(stamp, values[:2], values[2:])) for stamp, *values in truth]
+    stamps = [1_700_000_000 * 10**9 + k * 10_000_000 for k in range(ROWS)]
+    truth = {"t": [k * 0.01 for k in range(ROWS)]} | {
+        name: [draw.uniform(-9.0, 9.0) for _ in range(ROWS)] for name in SPEEDS}
+    truth |= {name: [speed * t for t in truth["t"]] for name, speed in zip(ANGLES[:2], (7.0, -2.0))}
+    pair = lambda name, k: (truth[name + "_r"][k], truth[name + "_l"][k])
+    speeds = lambda order: [(stamp, encode(stamp, (), pair("omega", k), pair("tau", k), order))
+                            for k, stamp in enumerate(stamps)]
+    messages = speeds("<")
+    angles = [(stamp, encode(stamp, pair("phi", k), (), pair("tau", k))) for k, stamp in enumerate(stamps)]
+    others = (("/arm/joint_states", TYPE, DEFINITION, encode(stamps[0], (0.5,), (0.25,), (), "<", ("elbow",))),
+              ("/chatter", "std_msgs/msg/String", "string data\n", b"\x00\x01\x00\x00\x03\x00\x00\x00hi\x00"))
     table = scratch / "seed.csv"
-    table.write_text("t,omega_r,omega_l,tau_r,tau_l\n" + "".join(
-        f"{(stamp - truth[0][0]) * 1e-9:.9f}," + ",".join(map(repr, values)) + "\n" for stamp, *values in truth))
+    table.write_text("t," + ",".join(SPEEDS) + "\n" + "".join(
+        f"{t:.9f}," + ",".join(repr(truth[name][k]) for name in SPEEDS) + "\n" for k, t in enumerate(truth["t"])))
 
-    seeds = {}  # name: path, reader, whether it has checksums
-    for name, chunked in (("bare.mcap", False), ("chunks.mcap", True)):
-        seeds[name] = scratch / name, read_mcap, False
-        write_mcap(seeds[name][0], messages, chunked)
-    seeds["rows.db3"] = scratch / "rows.db3", read_db3, False
-    write_db3(seeds["rows.db3"][0], messages)
-    of_ours = {"ours.mcap": ["--compression", "none"], "packed.mcap": ["--compression", "zstd"], "ours.db3": []}
+    def recorded(read, path):
+        return decoded(read(path))
+
+    def stored(group, path):
+        try:
+            return columns_of(hdf5.read(path, group))
+        except hdf5.Unreadable as wrong:
+            raise Unreadable from wrong
+
+    mcap, db3 = partial(recorded, read_mcap), partial(recorded, read_db3)
+    seeds = {}  # name: path, reader, whether it has checksums, columns
+    for name, columns, reader, write in (
+            ("bare.mcap", SPEEDS, mcap, lambda path: write_mcap(path, messages, False)),
+            ("chunks.mcap", SPEEDS, mcap, lambda path: write_mcap(path, messages, True)),
+            ("big.mcap", SPEEDS, mcap, lambda path: write_mcap(path, speeds(">"), True)),
+            ("angles.mcap", ANGLES, mcap, lambda path: write_mcap(path, angles, False)),
+            ("topics.mcap", SPEEDS, mcap, lambda path: write_mcap(path, messages, True, others)),
+            ("rows.db3", SPEEDS, db3, lambda path: write_db3(path, messages)),
+            ("topics.db3", ANGLES, db3, lambda path: write_db3(path, angles, others)),
+            ("plain.h5", SPEEDS, partial(stored, b""),
+             lambda path: hdf5.write(path, {name: truth[name] for name in ("t", *SPEEDS)}))):
+        seeds[name] = scratch / name, reader, False, columns
+        write(seeds[name][0])
+    of_ours = {"ours.mcap": ["--compression", "none"], "packed.mcap": ["--compression", "zstd"],
+               "lz4.mcap": ["--compression", "lz4"], "ours.db3": [], "ours.h5": []}
     for name, options in of_ours.items():
         path = scratch / name
         subprocess.run([program, "convert", table, path, "--force", "--quiet", *options], check=True)
-        seeds[name] = path, (read_db3 if name.endswith("db3") else read_mcap), name.endswith("mcap")
+        reader = {".mcap": mcap, ".db3": db3, ".h5": partial(stored, b"log")}[path.suffix]
+        seeds[name] = path, reader, name.endswith("mcap"), SPEEDS
 
     print(f"seed {seed}, {count} changes each\n{'recording':12} {'refused':>8} {'read':>6} {'whole':>6} {'no judge':>9}")
     failures = []
-    for name, (path, reader, checked) in seeds.items():
-        if name == "packed.mcap":
-            healthy = [(stamp - truth[0][0], *values) for stamp, *values in truth]
+    for name, (path, reader, checked, columns) in seeds.items():
+        if wanted and name not in wanted:
+            continue
+        if name in ("packed.mcap", "lz4.mcap"):
+            healthy = columns_of({name: truth[name] for name in ("t", *columns)})
         else:
-            healthy = decoded(reader(path))
+            healthy = reader(path)
         out = scratch / "out.csv"
         done = convert(program, path, out)
-        if done.returncode != 0 or len(healthy) != ROWS or [row[1:] for row in rows_of(out)] != [row[1:] for row in truth]:
+        names, rows = rows_of(out) if done.returncode == 0 else ((), [])
+        expected = [tuple(truth[name][k] for name in names) for k in range(ROWS)]
+        if set(names) != set(columns) or len(healthy) != ROWS or [row[1:] for row in rows] != expected:
             sys.exit(f"second reader: {name}: not read as it was written: {done.stderr}")
         tally = {"refused": 0, "read": 0, "whole": 0, "no judge": 0}
         for k in range(count):
@@ -368,9 +446,9 @@ def main():
             if done.returncode != 0:
                 failures.append((name, k, f"exit code {done.returncode}: {done.stderr[-300:]}", damaged.read_bytes()))
                 continue
-            rows = rows_of(out)
+            names, rows = rows_of(out)
             try:
-                second = decoded(reader(damaged))
+                second = reader(damaged)
             except Unreadable:
                 tally["no judge"] += 1
                 second = None
@@ -380,8 +458,8 @@ def main():
             tally["read"] += 1
             tally["whole"] += len(rows) == ROWS
             # Behind damage the program goes on at the next sound record, where this reader has lost the thread.
-            known = healthy if sure else second + (decoded(anywhere(damaged)) if reader is read_mcap else [])
-            wrong = judge(rows, known, len(second or ()), done.stdout)
+            known = healthy if sure else second + (decoded(anywhere(damaged)) if reader is mcap else [])
+            wrong = judge(names, rows, known, len(second or ()), done.stdout)
             if wrong:
                 failures.append((name, k, wrong, damaged.read_bytes()))
         print(f"{name:12} {tally['refused']:8} {tally['read']:6} {tally['whole']:6} {tally['no judge']:9}", flush=True)
