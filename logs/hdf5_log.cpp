@@ -45,6 +45,7 @@ struct Source {
   hsize_t rows = 0;
   hsize_t chunk = 0;      ///< bytes of one, 0 where it is not stored in chunks
   std::string refused{};  ///< why it is not read, without a subject; empty where it is
+  std::string unlike{};   ///< how it differs from a column, in spite of its name
   double factor = 1.0;    ///< by which its values are multiplied
 
   [[nodiscard]] std::string name() const { return member.empty() ? path.substr(path.rfind('/') + 1) : member; }
@@ -72,6 +73,25 @@ Handle open_file(const std::filesystem::path& path) {
 bool is_number(hid_t type) {
   const H5T_class_t kind = H5Tget_class(type);
   return kind == H5T_INTEGER || kind == H5T_FLOAT || kind == H5T_ENUM;
+}
+
+/// Why the numbers of a type are not those that it seems to have: only formats that machines have are taken, since a
+/// header without a checksum gives each bit its meaning. Empty where nothing speaks against them.
+std::string format_defect(hid_t type) {
+  const std::size_t bits = 8 * H5Tget_size(type), precision = H5Tget_precision(type);
+  bool usual = H5Tget_offset(type) == 0;
+  if (H5Tget_class(type) == H5T_FLOAT) {
+    std::size_t sign = 0, exponent = 0, exponent_size = 0, mantissa = 0, mantissa_size = 0;
+    H5Tget_fields(type, &sign, &exponent, &exponent_size, &mantissa, &mantissa_size);
+    const bool extended = precision == 80 && mantissa_size == 64;  // x87: the first bit of the mantissa is stored
+    usual = usual && (extended || precision == bits) && mantissa == 0 && exponent == mantissa_size &&
+            sign == exponent + exponent_size && precision == sign + 1 && exponent_size < 16 &&
+            H5Tget_ebias(type) == (std::size_t{1} << exponent_size) / 2 - 1 &&
+            H5Tget_norm(type) == (extended ? H5T_NORM_NONE : H5T_NORM_IMPLIED);
+  } else if (H5Tget_class(type) == H5T_INTEGER) {
+    usual = usual && precision == bits;
+  }
+  return usual ? "" : fmt::format("has numbers of {} bits in a format that no machine has: the file is damaged", bits);
 }
 
 /// The text of attribute `units` or `unit`; empty where there is none. Nothing where the attributes are damaged: the
@@ -207,7 +227,18 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
     sources.push_back({path, "", "", 0, 0, "cannot be opened by the HDF5 library: the file is damaged"});
     return;
   }
-  if (H5Sget_simple_extent_ndims(space.get()) != 1) {
+  const int dimensions = H5Sget_simple_extent_ndims(space.get());
+  const H5T_class_t kind = H5Tget_class(type.get());
+  if (dimensions != 1 || (!is_number(type.get()) && kind != H5T_COMPOUND)) {
+    Source source{
+        .path = path,
+        .member = "",
+        .unit = "",
+        .rows = 0,
+        .unlike = dimensions != 1 ? fmt::format("has {} dimensions: expected 1", dimensions) : "holds no numbers"};
+    if (recognise_log_column(source.name()) != nullptr) {
+      sources.push_back(std::move(source));
+    }
     return;
   }
   hsize_t rows = 0;
@@ -216,8 +247,12 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
   const std::string refused = refusal(dataset.get(), type.get(), rows, trust, chunk);
   if (is_number(type.get())) {
     const std::optional<std::string> unit = unit_of(dataset.get());
-    sources.push_back({path, "", unit.value_or(""), rows, chunk, unit ? refused : "has damaged attributes"});
-  } else if (H5Tget_class(type.get()) == H5T_COMPOUND) {
+    const std::string strange = format_defect(type.get());
+    sources.push_back({path, "", unit.value_or(""), rows, chunk,
+                       !unit             ? "has damaged attributes"
+                       : strange.empty() ? refused
+                                         : strange});
+  } else {
     const int members = H5Tget_nmembers(type.get());
     for (int k = 0; k < members; ++k) {
       const auto index = static_cast<unsigned>(k);
@@ -227,8 +262,9 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
       const bool inside =
           member && H5Tget_member_offset(type.get(), index) + H5Tget_size(member.get()) <= H5Tget_size(type.get());
       if (name != nullptr && (!inside || is_number(member.get()))) {
-        sources.push_back(
-            {path, name, "", rows, chunk, inside ? refused : "ends outside of its row: the file is damaged"});
+        const std::string strange =
+            inside ? format_defect(member.get()) : "ends outside of its row: the file is damaged";
+        sources.push_back({path, name, "", rows, chunk, strange.empty() ? refused : strange});
       }
       H5free_memory(name);
     }
@@ -391,7 +427,8 @@ class DatasetChooser {
     std::vector<std::string> homes;
     for (const Source& source : sources_) {
       const LogColumn* column = meaning_of(source);
-      if (column != nullptr && column->name == "t" && std::ranges::find(homes, source.home()) == homes.end()) {
+      if (column != nullptr && column->name == "t" && source.unlike.empty() &&
+          std::ranges::find(homes, source.home()) == homes.end()) {
         homes.push_back(source.home());
       }
     }
@@ -439,8 +476,8 @@ class DatasetChooser {
   }
 
   void take(const std::string& name, Source source) {
-    if (!source.refused.empty()) {
-      throw InputError(fmt::format("{}: {} {}", path_, source.shown(), source.refused));
+    if (const std::string& why = source.refused.empty() ? source.unlike : source.refused; !why.empty()) {
+      throw InputError(fmt::format("{}: {} {}", path_, source.shown(), why));
     }
     choice_.found.insert_or_assign(name, std::move(source));
   }
@@ -457,6 +494,10 @@ class DatasetChooser {
     const std::string& name = column->name;
     if (options_.map.contains(name) ||
         (options_.only && name != "t" && std::ranges::find(*options_.only, name) == options_.only->end())) {
+      return;
+    }
+    if (!source.unlike.empty()) {
+      choice_.notes.push_back(fmt::format("{} was not taken as {}: it {}", source.shown(), name, source.unlike));
       return;
     }
     if (const auto other = choice_.found.find(name); other != choice_.found.end()) {

@@ -10,6 +10,7 @@
 #   tests/long.sh faults      kills, full disks, closed streams and the like, 2,000 of them (tools/faults.py, as root)
 #   tests/long.sh coverage    lines that the tests run, by room, and those they do not (tools/coverage.py)
 #   tests/long.sh alone       every source file by itself, by clang (tools/check_alone.py, ten minutes)
+#   tests/long.sh tidy        clang-tidy (tools/check_tidy.py, half an hour)
 #   tests/long.sh sanitizers  all test programs once more under AddressSanitizer and UndefinedBehaviorSanitizer, but for these
 set -eu
 cd "$(dirname "$0")/.."
@@ -50,6 +51,11 @@ for part in ${*:-slow campaign sanitizers}; do
       tools/setup.sh --ci
       tools/check_alone.py
       ;;
+    tidy)
+      tools/setup.sh --ci
+      tools/build.sh release
+      tools/check_tidy.py
+      ;;
     sanitizers)
       tools/build.sh asan
       tests/sanitized.py "$jobs"
@@ -79,7 +85,7 @@ for part in ${*:-slow campaign sanitizers}; do
       ;;
     [0-9]*) ;;
     *)
-      echo "usage: tests/long.sh [slow] [campaign] [endurance] [faults] [coverage] [alone] [sanitizers] | fuzz [SECONDS] | mutations [COUNT]" >&2
+      echo "usage: tests/long.sh [slow] [campaign] [endurance] [faults] [coverage] [alone] [tidy] [sanitizers] | fuzz [SECONDS] | mutations [COUNT]" >&2
       exit 2
       ;;
   esac

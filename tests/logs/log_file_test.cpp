@@ -634,6 +634,77 @@ TEST_F(LogFile, AnHdf5FileThatCannotBeListedIsRefused) {
   EXPECT_THAT(input_error([&] { read({path("type.h5")}); }), HasSubstr("/log/omega_r is no dataset"));
 }
 
+// Numbers came out that nobody had written.
+TEST_F(LogFile, NumbersOfAnHdf5FileHaveAFormatOfMachines) {
+  const std::string content = bytes(write("whole.h5", drive()));
+  // Class and sign; size; offset and precision; places and sizes of exponent and mantissa; bias.
+  const std::string doubles("\x11\x20\x3f\0\x08\0\0\0\0\0\x40\0\x34\x0b\0\x34\xff\x03\0\0", 20);
+  const std::size_t at = content.find(doubles);
+  ASSERT_NE(at, std::string::npos);
+  std::size_t read_otherwise = 0;
+  const LogTable sound = read({path("whole.h5")});
+  for (std::size_t k = 0; k < 8 * doubles.size(); ++k) {
+    std::string damaged = content;
+    damaged[at + k / 8] = static_cast<char>(damaged[at + k / 8] ^ 1 << k % 8);
+    put("damaged.h5", damaged);
+    try {
+      const LogTable got = read({path("damaged.h5")});
+      read_otherwise += got.names == sound.names && (got.t != sound.t || got.columns != sound.columns) ? 1 : 0;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("damaged.h5"));
+    }
+  }
+  EXPECT_LE(read_otherwise, 1U) << "the order of bytes cannot be told from another";
+
+  const hsize_t rows = 64;
+  for (const hid_t type : {H5T_IEEE_F32LE, H5T_IEEE_F32BE, H5T_IEEE_F64BE, H5T_NATIVE_LDOUBLE, H5T_STD_I16BE,
+                           H5T_STD_I64LE, H5T_STD_U32LE, H5T_STD_I8LE}) {
+    const hid_t file = H5Fcreate(path("a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t space = H5Screate_simple(1, &rows, nullptr);
+    std::vector<double> t(rows), omega(rows);
+    for (std::size_t k = 0; k < rows; ++k) {
+      t[k] = static_cast<double>(k);
+      omega[k] = static_cast<double>(k % 7);
+    }
+    for (const auto& [name, column] : {std::pair{"t", &t}, {"omega_r", &omega}}) {
+      const hid_t data = H5Dcreate2(file, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+      EXPECT_GE(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, column->data()), 0);
+      H5Dclose(data);
+    }
+    H5Sclose(space);
+    H5Fclose(file);
+    EXPECT_EQ(read({path("a.h5")}).column("omega_r"), omega);
+  }
+}
+
+TEST_F(LogFile, WhatIsNamedLikeAColumnAndIsNoneIsSaid) {
+  const LogTable table = drive();
+  {
+    Hdf5File file(path("a.h5"));
+    file.put("t", table.t, "s");
+    file.put("omega_l", table.column("omega_l"), "rad/s");
+  }
+  const hid_t file = H5Fopen(path("a.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  const hsize_t sides[] = {3, 4};
+  const hid_t plane = H5Screate_simple(2, sides, nullptr), line = H5Screate_simple(1, sides, nullptr);
+  const hid_t text = H5Tcopy(H5T_C_S1);
+  H5Tset_size(text, 8);
+  H5Dclose(H5Dcreate2(file, "omega_r", H5T_NATIVE_DOUBLE, plane, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  H5Dclose(H5Dcreate2(file, "tau_r", text, line, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  H5Dclose(H5Dcreate2(file, "note", text, line, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  H5Tclose(text);
+  H5Sclose(line);
+  H5Sclose(plane);
+  H5Fclose(file);
+  EXPECT_EQ(read({path("a.h5")}).names, std::vector<std::string>{"omega_l"});
+  EXPECT_THAT(report.files[0].notes,
+              ::testing::UnorderedElementsAre("/omega_r was not taken as omega_r: it has 2 dimensions: expected 1",
+                                              "/tau_r was not taken as tau_r: it holds no numbers"));
+  LogOptions options;
+  options.map = {{"omega_r", "/omega_r"}};
+  EXPECT_THAT(input_error([&] { read({path("a.h5")}, options); }), HasSubstr("/omega_r has 2 dimensions: expected 1"));
+}
+
 // What is not there is read as zeros.
 TEST_F(LogFile, PiecesOfHdf5ThatWereNeverWrittenAreRefused) {
   const LogTable table = drive();
