@@ -117,7 +117,7 @@ void bury_parts(const fs::path& stem, bool directory) {
     const std::string name = entry->path().filename().native();
     const std::size_t digits = name.find_last_not_of("0123456789") + 1;
     if (digits < name.size() && std::string_view(name).substr(0, digits).ends_with(part) &&
-        living().paths.count(entry->path()) == 0) {
+        !living().paths.contains(entry->path())) {
       bury(entry->path(), directory);
     }
   }

@@ -68,12 +68,12 @@ void refuse_holes(const fs::path& path) {
   }
 }
 
-std::string storage_ending(const fs::path& given) {
-  fs::path name = given;
-  if (name.extension() == ".zstd" || name.extension() == ".zst") {
-    name = name.stem();
+std::string storage_ending(const fs::path& name) {
+  fs::path plain = name;
+  if (plain.extension() == ".zstd" || plain.extension() == ".zst") {
+    plain = plain.stem();
   }
-  return name.extension() == ".mcap" ? "mcap" : name.extension() == ".db3" ? "db3" : "";
+  return plain.extension() == ".mcap" ? "mcap" : plain.extension() == ".db3" ? "db3" : "";
 }
 
 namespace {

@@ -210,7 +210,8 @@ class BagWalk final : public RowWalk {
       file.hash += (file.hash.empty() ? "" : " ") + of.hash;
       file.notes.insert(file.notes.end(), of.losses.begin(), of.losses.end());
     }
-    file.time_origin = static_cast<double>(origin_ / one_second);
+    const std::int64_t whole_seconds = origin_ / one_second;
+    file.time_origin = static_cast<double>(whole_seconds);
     file.header = plan_.choice.header;
     for (const std::string& field : plan_.choice.header) {
       if (!is_used(field)) {

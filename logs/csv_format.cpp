@@ -513,7 +513,7 @@ std::unique_ptr<Packer> packer_for(const std::filesystem::path& path, files::Ato
 
 void append_number(std::string& text, double value) {
   std::array<char, 32> digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+  char* const end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
   text.append(digits.data(), end);
 }
 

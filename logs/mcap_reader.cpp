@@ -400,7 +400,7 @@ struct McapReader::Impl {
           break;
         }
         default:
-          if (op == 0 || op <= static_cast<std::uint8_t>(Op::data_end)) {
+          if (op <= static_cast<std::uint8_t>(Op::data_end)) {
             rest_of_chunk("no " + mcap::op_name(op) + " record may be inside a chunk");
             return false;
           }

@@ -92,17 +92,17 @@ Json to_json(const detector::Incident& incident) {
           {"sentence", words::incident_sentence(incident)}};
 }
 
-void add_incidents(Json& json, const std::vector<detector::Incident>& incidents) {
-  Json& list = json["incidents"] = Json::array();
+void add_incidents(Json& detection, const std::vector<detector::Incident>& incidents) {
+  Json& list = detection["incidents"] = Json::array();
   for (const detector::Incident& incident : incidents) {
     list.push_back(to_json(incident));
   }
 }
 
-void add_isolation(Json& json, const std::vector<detector::Isolation>& isolations) {
+void add_isolation(Json& detection, const std::vector<detector::Isolation>& isolations) {
   using Verdict = detector::FaultFinding::Verdict;
   for (std::size_t k = 0; k < isolations.size(); ++k) {
-    Json &event = json["events"][k], consistent = Json::array(), excluded = Json::array(), open = Json::array();
+    Json &event = detection["events"][k], consistent = Json::array(), excluded = Json::array(), open = Json::array();
     for (const detector::FaultFinding& f : isolations[k].findings) {
       if (f.verdict == Verdict::excluded) {
         excluded.push_back(f.fault.name);
@@ -160,24 +160,24 @@ void add_at_risk(Json& json, const commission::RiskWatch& watch, const OnlineMod
   json["fault"] = json["fault"].get<bool>() || !watch.events.empty();
 }
 
-void add_kinematic(Json& json, const commission::KinematicWatch& watch, const OnlineModel& model) {
+void add_kinematic(Json& detection, const commission::KinematicWatch& watch, const OnlineModel& model) {
   const Detection none;
   const Detection& d = watch.detection ? *watch.detection : none;
   const OnlineModel view = commission::with_kinematic_outputs(model);
   const Json own = to_json(d, view, {}, {}, {});
   for (const Json& output : own.at("outputs")) {
-    json["outputs"].push_back(output);
+    detection["outputs"].push_back(output);
   }
-  std::vector<Json> events = json.at("events").get<std::vector<Json>>();
+  std::vector<Json> events = detection.at("events").get<std::vector<Json>>();
   events.insert(events.end(), own.at("events").begin(), own.at("events").end());
   std::ranges::stable_sort(events, {}, [](const Json& event) { return event.at("alarm").get<double>(); });
-  json["events"] = events;
-  json["fault"] = json["fault"].get<bool>() || !events.empty();
-  json["kinematic"] = {{"warrant", core::warrant_word(view.warrant)},
-                       {"watched", watch.detection.has_value()},
-                       {"message", watch.message},
-                       {"instants", d.instants},
-                       {"seconds", d.seconds}};
+  detection["events"] = events;
+  detection["fault"] = detection["fault"].get<bool>() || !events.empty();
+  detection["kinematic"] = {{"warrant", core::warrant_word(view.warrant)},
+                            {"watched", watch.detection.has_value()},
+                            {"message", watch.message},
+                            {"instants", d.instants},
+                            {"seconds", d.seconds}};
 }
 
 using commission::Guarantee;

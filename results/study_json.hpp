@@ -63,8 +63,8 @@ inline constexpr const char* kSensitivitySchema = "wheelwright/sensitivity/1";
 
 /// The study and its result as JSON (results/sensitivity.schema.json). `file` is the study file as it was named. Values
 /// that are not there, and sizes of faults where none is certain, are null.
-[[nodiscard]] Json to_json(const StudyFile& study, const study::StudyResult& result,
-                           const std::optional<study::LocalSensitivity>& local, const std::string& file,
+[[nodiscard]] Json to_json(const StudyFile& file, const study::StudyResult& result,
+                           const std::optional<study::LocalSensitivity>& local, const std::string& name,
                            const std::string& software);
 
 }  // namespace wheelwright::results

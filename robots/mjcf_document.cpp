@@ -162,7 +162,7 @@ class MjcfDocument final : public SimulatorDocument {
   std::string scale_gain(const TreeJoint& joint, double factor) override {
     const std::vector<Id> actuators = actuators_of(joint);
     for (const Id actuator : actuators) {
-      if (const std::string why = not_scaled(actuator); !why.empty()) {
+      if (std::string why = not_scaled(actuator); !why.empty()) {
         return why;
       }
     }

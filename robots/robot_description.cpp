@@ -58,7 +58,7 @@ void require_possible(const TreeInertial& inertial) {
     inertial.place.fail("mass 0 with an inertia: expected a mass > 0 in kg");
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(t, Eigen::EigenvaluesOnly);
-  const Eigen::Vector3d p = solver.eigenvalues();  // in rising order
+  const Eigen::Vector3d& p = solver.eigenvalues();  // in rising order
   if (!p.allFinite()) {
     inertial.place.fail("moments of inertia beyond reckoning: expected kg·m²");
   }

@@ -324,14 +324,14 @@ bool is_group(const std::string& key) {
 
 }  // namespace
 
-std::string robot_yaml(const RobotWithOrigins& made) {
+std::string robot_yaml(const RobotWithOrigins& robot) {
   const auto origin = [&](const std::string& key) {
-    const auto it = made.origins.find(key);
-    return it == made.origins.end() ? std::string("default") : it->second;
+    const auto it = robot.origins.find(key);
+    return it == robot.origins.end() ? std::string("default") : it->second;
   };
-  std::string out =
-      comment("A robot file made of " + core::listed(made.files) + ". Above each value stands where it came from.", "");
-  const Json object = to_json(made.robot);
+  std::string out = comment(
+      "A robot file made of " + core::listed(robot.files) + ". Above each value stands where it came from.", "");
+  const Json object = to_json(robot.robot);
   for (const auto& member : object.items()) {
     if (is_group(member.key())) {
       out += member.key() + ":\n";
@@ -349,7 +349,7 @@ std::string robot_yaml(const RobotWithOrigins& made) {
       out += comment(origin(member.key()), "") + member.key() + ": " + files::json_text(member.value(), -1) + "\n";
     }
   }
-  for (const std::string& remark : made.remarks) {
+  for (const std::string& remark : robot.remarks) {
     out += comment(remark, "");
   }
   return out;
