@@ -188,8 +188,14 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t
   if (rows > most_rows) {
     return fmt::format("has {} values: expected at most {}", rows, most_rows);
   }
-  if (rows > 0 && layout != H5D_VIRTUAL && H5Pget_external_count(how.get()) == 0 && H5Dget_storage_size(dataset) == 0) {
+  const hsize_t stored = H5Dget_storage_size(dataset);
+  if (rows > 0 && layout != H5D_VIRTUAL && H5Pget_external_count(how.get()) == 0 && stored == 0) {
     return fmt::format("has {} values, none of which was written", rows);
+  }
+  // The library reads on behind values that stand in a header.
+  if ((layout == H5D_COMPACT || (layout == H5D_CONTIGUOUS && H5Pget_external_count(how.get()) == 0)) &&
+      stored / width < rows) {
+    return fmt::format("has {} values of {} bytes in {} bytes: the file is damaged", rows, width, stored);
   }
   return {};
 }

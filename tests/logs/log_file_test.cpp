@@ -705,6 +705,38 @@ TEST_F(LogFile, WhatIsNamedLikeAColumnAndIsNoneIsSaid) {
   EXPECT_THAT(input_error([&] { read({path("a.h5")}, options); }), HasSubstr("/omega_r has 2 dimensions: expected 1"));
 }
 
+// The library read what stands in memory behind them.
+TEST_F(LogFile, ValuesInAHeaderAreAsManyAsItHolds) {
+  const hsize_t rows = 64;
+  const auto make = [&](H5D_layout_t layout) {
+    const hid_t file = H5Fcreate(path("a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t how = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(1, &rows, nullptr);
+    H5Pset_layout(how, layout);
+    for (const char* const name : {"t", "omega_r"}) {
+      std::vector<double> values(rows);
+      std::iota(values.begin(), values.end(), 0.0);
+      const hid_t data = H5Dcreate2(file, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, how, H5P_DEFAULT);
+      EXPECT_GE(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+      H5Dclose(data);
+    }
+    H5Sclose(space);
+    H5Pclose(how);
+    H5Fclose(file);
+  };
+  for (const H5D_layout_t layout : {H5D_COMPACT, H5D_CONTIGUOUS}) {
+    make(layout);
+    EXPECT_EQ(read({path("a.h5")}).t.size(), rows);
+    std::string content = bytes(path("a.h5"));
+    // 64 values become 1,088, in both extents of a dataspace.
+    for (std::size_t at = 0;
+         (at = content.find(std::string("\x01\x01\x01\0\0\0\0\0\x40\0\0\0", 12), at)) != std::string::npos; ++at) {
+      content[at + 9] = content[at + 17] = '\x04';
+    }
+    const auto file = put("damaged.h5", content);
+    EXPECT_THAT(input_error([&] { read({file}); }), HasSubstr("has 1088 values of 8 bytes in 512 bytes"));
+  }
+}
+
 // What is not there is read as zeros.
 TEST_F(LogFile, PiecesOfHdf5ThatWereNeverWrittenAreRefused) {
   const LogTable table = drive();
