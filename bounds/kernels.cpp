@@ -25,7 +25,6 @@ std::span<const Table* const> available() {
 
 const Table& best() { return *available().back(); }
 
-extern const Table k_baseline;
 const Table k_baseline = Loops<2>::table("baseline");
 
 }  // namespace wheelwright::bounds::kernels

@@ -184,7 +184,7 @@ struct Loops {
   struct Group {
     const Slabs& slabs;
     std::size_t i, lanes;
-    Vector held[P > 0 ? P : 1];
+    Vector held[P + (P == 0 ? 1 : 0)];
 
     Group(const Slabs& all, std::size_t first, std::size_t count) : slabs(all), i(first), lanes(count) {
       for (std::size_t j = 0; P > 0 && j < P; ++j) {

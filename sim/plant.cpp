@@ -200,20 +200,20 @@ DryThreshold dry_threshold(const DriveEffects& e, const DifferentialDrive& drive
 }
 
 EffectLoad effect_load(const DriveEffects& e, const DifferentialDrive& drive, const model::DriveParameters& p,
-                       const DryThreshold& threshold, const EffectState& x) {
+                       const DryThreshold& threshold, const EffectState& s) {
   EffectLoad load;
-  const double warm = e.drift * -std::expm1(-x.t / e.drift_time);
+  const double warm = e.drift * -std::expm1(-s.t / e.drift_time);
   for (Eigen::Index j = 0; j < 2; ++j) {
-    const double w = x.wheel_speed[j], slow = w / e.stribeck_speed;
+    const double w = s.wheel_speed[j], slow = w / e.stribeck_speed;
     const double dry =
-        e.coulomb[j] * (1.0 - warm) + e.stribeck * std::exp(-slow * slow) + e.load * std::abs(x.torque[j]);
-    load.torque[j] = dry * soft_sign(w, threshold.wheel) + e.bias[j] + e.round_cos[j] * std::cos(x.wheel_angle[j]) +
-                     e.round_sin[j] * std::sin(x.wheel_angle[j]);
+        e.coulomb[j] * (1.0 - warm) + e.stribeck * std::exp(-slow * slow) + e.load * std::abs(s.torque[j]);
+    load.torque[j] = dry * soft_sign(w, threshold.wheel) + e.bias[j] + e.round_cos[j] * std::cos(s.wheel_angle[j]) +
+                     e.round_sin[j] * std::sin(s.wheel_angle[j]);
   }
   for (const DriveEffects::ByTerms& effect : e.by_terms) {
-    load.torque += torques_of(effect, drive, p.mass, threshold.per_torque, x);
+    load.torque += torques_of(effect, drive, p.mass, threshold.per_torque, s);
   }
-  const double r = drive.wheel_radius, arm = 0.5 * (drive.track_width + e.track), u = x.speed, w = x.yaw_rate;
+  const double r = drive.wheel_radius, arm = 0.5 * (drive.track_width + e.track), u = s.speed, w = s.yaw_rate;
   const double across = e.caster_arm * w, caster = std::max(std::hypot(u, across), threshold.caster);
   double sum = e.viscous * arm * w / r + e.drag * u * std::abs(u);
   double difference = e.viscous * arm * u / r + e.drag_yaw * w * std::abs(w) + e.scrub * soft_sign(w, threshold.yaw);
@@ -222,7 +222,7 @@ EffectLoad effect_load(const DriveEffects& e, const DifferentialDrive& drive, co
     difference += e.caster * e.caster_arm * across / caster;
   }
   load.force = sum / r - p.mass * e.com_longitudinal * w * w - warm * p.viscous_x * u +
-               p.mass * (e.gravity[0] * std::cos(x.heading) + e.gravity[1] * std::sin(x.heading));
+               p.mass * (e.gravity[0] * std::cos(s.heading) + e.gravity[1] * std::sin(s.heading));
   load.moment = difference / r + p.mass * e.com_longitudinal * u * w - warm * p.viscous_yaw * w;
   return load;
 }
