@@ -29,7 +29,6 @@ namespace {
 struct Variant {};
 }  // namespace
 
-extern const GramKernels k_baseline;
 const GramKernels k_baseline{"baseline", GramLoops<2, Variant>::products, GramLoops<2, Variant>::gradient};
 
 }  // namespace wheelwright::identify::gram_kernels

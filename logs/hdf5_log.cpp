@@ -200,8 +200,8 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t
   return {};
 }
 
-/// The first row of a dataset in chunks whose chunk does not stand in the file; the library reads it as zeros. Nothing
-/// where all do.
+/// The first row of a dataset in chunks whose chunk the library finds no way to in the file, as it looks for it when it
+/// reads: it takes zeros in its place. Nothing where it finds all.
 std::optional<hsize_t> first_unwritten(hid_t dataset, hsize_t rows) {
   const Handle how(H5Dget_create_plist(dataset), H5Pclose);
   hsize_t piece = 0;
@@ -209,10 +209,8 @@ std::optional<hsize_t> first_unwritten(hid_t dataset, hsize_t rows) {
     return std::nullopt;
   }
   for (hsize_t row = 0; row < rows; row += piece) {
-    unsigned left_out = 0;
-    haddr_t place = HADDR_UNDEF;
     hsize_t bytes = 0;
-    if (H5Dget_chunk_info_by_coord(dataset, &row, &left_out, &place, &bytes) < 0 || place == HADDR_UNDEF) {
+    if (H5Dget_chunk_storage_size(dataset, &row, &bytes) < 0 || bytes == 0) {
       return row;
     }
   }

@@ -776,6 +776,15 @@ TEST_F(LogFile, PiecesOfHdf5ThatWereNeverWrittenAreRefused) {
     trust.trust = true;
     EXPECT_EQ(read({path("a.h5")}, trust).column("omega_r").at(left_out), 0.0);
   }
+  // The way to the last piece is lost where the key behind it, which says where the pieces end, is damaged.
+  make(0, 0);
+  std::string content = bytes(path("a.h5"));
+  const std::size_t tree = content.rfind(std::string("TREE\x01", 5)),
+                    pieces = static_cast<unsigned char>(content[tree + 6]);
+  const std::size_t key = tree + 24 + 32 * pieces;  // of 24 bytes, each with a place of 8 behind it
+  content.replace(key + 8, 8, 8, '\0');
+  const auto file = put("damaged.h5", content);
+  EXPECT_THAT(input_error([&] { read({file}); }), HasSubstr("were never written or are lost"));
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # IEEE 754, 64 bits, little-endian (IV.A.2.d): class 1 of version 1, what its bits are, 8 bytes.
 DOUBLE = bytes([0x11, 0x20, 0x3F, 0x00]) + struct.pack("<IHHBBBBI", 8, 0, 64, 52, 11, 0, 52, 1023)
 LAYOUT, TYPE, SPACE, FILTERS, ATTRIBUTE, CONTINUED, SYMBOLS = 0x08, 0x03, 0x01, 0x0B, 0x0C, 0x10, 0x11
-UNITS = {"t": b"s", "omega_r": b"rad/s", "omega_l": b"rad/s", "tau_r": b"N\xc2\xb7m", "tau_l": b"N\xc2\xb7m"}
+UNITS = {"t": b"s", "phi_r": b"rad", "phi_l": b"rad", "omega_r": b"rad/s", "omega_l": b"rad/s", "tau_r": b"N\xc2\xb7m", "tau_l": b"N\xc2\xb7m"}
 
 
 class Unreadable(Exception):
@@ -187,8 +187,8 @@ def read(path, group=b""):
     return columns
 
 
-def write(path, columns):
-    """Datasets of doubles in the root group, in one piece each, without filters and attributes."""
+def write(path, columns, piece=0):
+    """Datasets of doubles in the root group, in one piece each or in pieces of so many, without filters and attributes."""
     data = bytearray(96)  # the superblock, written last
 
     def put(content):
@@ -206,9 +206,19 @@ def write(path, columns):
     addresses, offsets, text = [], [], b"\0" * 8
     for name in names:
         values = columns[name]
-        place = put(struct.pack(f"<{len(values)}d", *values))
+        if piece:
+            keys = b""
+            for first in range(0, len(values), piece):
+                part = (values[first:first + piece] + [0.0] * piece)[:piece]
+                keys += struct.pack("<IIQQQ", 8 * piece, 0, first, 0, put(struct.pack(f"<{piece}d", *part)))
+            count = -(-len(values) // piece)
+            keys += struct.pack("<IIQQ", 0, 0, count * piece, 8)
+            tree = put((struct.pack("<4sBBHQQ", b"TREE", 1, 0, count, NONE, NONE) + keys).ljust(24 + 32 * 64 + 24, b"\0"))
+            layout = struct.pack("<BBBQII", 3, 2, 2, tree, piece, 8)
+        else:
+            layout = struct.pack("<BBQQ", 3, 1, put(struct.pack(f"<{len(values)}d", *values)), 8 * len(values))
         space = struct.pack("<BBBxxxxxQ", 1, 1, 0, len(values))
-        addresses.append(header((SPACE, space), (TYPE, DOUBLE), (LAYOUT, struct.pack("<BBQQ", 3, 1, place, 8 * len(values)))))
+        addresses.append(header((SPACE, space), (TYPE, DOUBLE), (LAYOUT, layout)))
         offsets.append(len(text))
         text += name.encode() + b"\0" * (8 - len(name) % 8)
     symbols = b"".join(struct.pack("<QQIxxxx16x", offset, address, 0) for offset, address in zip(offsets, addresses))

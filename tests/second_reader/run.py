@@ -385,6 +385,7 @@ def main():
     angles = [(stamp, encode(stamp, pair("phi", k), (), pair("tau", k))) for k, stamp in enumerate(stamps)]
     others = (("/arm/joint_states", TYPE, DEFINITION, encode(stamps[0], (0.5,), (0.25,), (), "<", ("elbow",))),
               ("/chatter", "std_msgs/msg/String", "string data\n", b"\x00\x01\x00\x00\x03\x00\x00\x00hi\x00"))
+    table_of = lambda columns: {name: truth[name] for name in ("t", *columns)}
     table = scratch / "seed.csv"
     table.write_text("t," + ",".join(SPEEDS) + "\n" + "".join(
         f"{t:.9f}," + ",".join(repr(truth[name][k]) for name in SPEEDS) + "\n" for k, t in enumerate(truth["t"])))
@@ -408,8 +409,8 @@ def main():
             ("topics.mcap", SPEEDS, mcap, lambda path: write_mcap(path, messages, True, others)),
             ("rows.db3", SPEEDS, db3, lambda path: write_db3(path, messages)),
             ("topics.db3", ANGLES, db3, lambda path: write_db3(path, angles, others)),
-            ("plain.h5", SPEEDS, partial(stored, b""),
-             lambda path: hdf5.write(path, {name: truth[name] for name in ("t", *SPEEDS)}))):
+            ("plain.h5", SPEEDS, partial(stored, b""), lambda path: hdf5.write(path, table_of(SPEEDS))),
+            ("pieces.h5", ANGLES, partial(stored, b""), lambda path: hdf5.write(path, table_of(ANGLES), 40))):
         seeds[name] = scratch / name, reader, False, columns
         write(seeds[name][0])
     of_ours = {"ours.mcap": ["--compression", "none"], "packed.mcap": ["--compression", "zstd"],
@@ -426,7 +427,7 @@ def main():
         if wanted and name not in wanted:
             continue
         if name in ("packed.mcap", "lz4.mcap"):
-            healthy = columns_of({name: truth[name] for name in ("t", *columns)})
+            healthy = columns_of(table_of(columns))
         else:
             healthy = reader(path)
         out = scratch / "out.csv"
