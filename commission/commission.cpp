@@ -528,8 +528,8 @@ std::string status_message(const Setting& s, const Commissioning& result) {
     }
     case Commissioning::Status::nothing: return "the log says nothing about any parameter: " + todo;
     case Commissioning::Status::empty: {
-      const std::string why = withdrawal(result), prior = default_prior_in_the_way(s, result);
-      if (!prior.empty()) {
+      const std::string why = withdrawal(result);
+      if (std::string prior = default_prior_in_the_way(s, result); !prior.empty()) {
         return prior;
       }
       return fmt::format(

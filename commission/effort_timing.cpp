@@ -59,8 +59,8 @@ double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
   }
   const identify::LongRunCovariance seen = identify::long_run_covariance(scores);
   const Eigen::VectorXd of_sums = identify::long_run_covariance(errors).matrix.diagonal();
-  const double instants = static_cast<double>(from.more.size() / outputs);
-  const double stationary = std::max(seen.matrix(0, 0), of_sums.dot(sizes) / instants);
+  const std::size_t instants = from.more.size() / outputs;
+  const double stationary = std::max(seen.matrix(0, 0), of_sums.dot(sizes) / static_cast<double>(instants));
   const double limit =
       std::min(certain(identify::effective_freedom(squares.blocks().row(0), static_cast<std::size_t>(seen.freedom))) *
                    std::sqrt(seen.matrix(0, 0)),

@@ -51,7 +51,7 @@ std::string in_effort_unit(const Robot& robot, const std::string& unit) {
   if (robot.effort == model::EffortKind::torque) {
     return unit;
   }
-  const std::string effort = robot.effort == model::EffortKind::current ? "A" : "V";
+  std::string effort = robot.effort == model::EffortKind::current ? "A" : "V";
   if (unit == "N·m") {
     return effort;
   }
@@ -97,7 +97,7 @@ std::string parameter_unit(const Robot& robot, const model::Parameter& parameter
   if (robot.effort == model::EffortKind::torque) {
     return parameter.unit;
   }
-  const std::string effort = robot.effort == model::EffortKind::current ? "A" : "V";
+  std::string effort = robot.effort == model::EffortKind::current ? "A" : "V";
   std::string unit = parameter.unit;
   if (parameter.name == "r_mass") {
     return effort + "·s²/m";

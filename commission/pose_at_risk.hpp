@@ -28,12 +28,12 @@ struct PoseAtRiskOptions {
 /// `shortest_step`: s, between poses.
 [[nodiscard]] std::optional<detector::PoseErrors> pose_errors(const Robot& robot, double shortest_step);
 
-/// The half-spaces of which the set at a risk is the intersection, as rows |y − Yϑ| <= dy over the box of `model` (the
-/// guaranteed one): first its facets, whose other side is that box, then the sums over scales of 1 s and more at all
+/// The half-spaces of which the set at a risk is the intersection, as rows |y − Yϑ| <= dy over the box of the
+/// `guaranteed` model: first its facets, whose other side is that box, then the sums over scales of 1 s and more at all
 /// looks after the learning, in the order of time, as far as they cut the box; RegressionBlock::sample numbers them,
 /// facets first. Of `risk` the risk of all looks together, which is spread over the time driven in `log`, errors, scales and
 /// delay are used; V0 is learnt of the share `learning` of the log. Walks it four times.
-[[nodiscard]] RegressionBlock pose_sum_rows(LogSource& log, const detector::KinematicModel& model,
+[[nodiscard]] RegressionBlock pose_sum_rows(LogSource& log, const detector::KinematicModel& guaranteed,
                                             const detector::PoseRiskModel& risk, double learning);
 
 /// Set, thresholds and verdict.
@@ -44,11 +44,11 @@ struct PoseAtRisk {
   std::string detail;  ///< why there is no model, for people; empty where there is
 };
 
-/// The set of `model` (the guaranteed one) cut by sums (pose_sum_rows()) with all their risks together
+/// The set of the `guaranteed` model cut by sums (pose_sum_rows()) with all their risks together
 /// PoseAtRiskOptions::risk; V0 of later driving; and the test: the log contradicts the assumption where no parameters
 /// are left, where a sum stands outside, or where sums spread wider than such errors make them, time and again.
 /// `seconds`: of the log.
-[[nodiscard]] PoseAtRisk pose_at_risk(LogSource& log, const detector::KinematicModel& model,
+[[nodiscard]] PoseAtRisk pose_at_risk(LogSource& log, const detector::KinematicModel& guaranteed,
                                       const detector::PoseErrors& errors, double seconds,
                                       const PoseAtRiskOptions& options = {});
 

@@ -35,7 +35,7 @@ std::optional<double> nominal_parameter(const Robot& robot, const Model& model, 
 double example_value(const std::string& unit) {
   constexpr std::pair<const char*, double> kValues[] = {{"kg", 20.0},       {"kg·m²", 0.8}, {"N·s/m", 4.0},
                                                         {"N·m·s/rad", 0.5}, {"N·m", 0.3},   {"N", 3.0}};
-  const auto found = std::ranges::find(kValues, unit, &std::pair<const char*, double>::first);
+  const auto* const found = std::ranges::find(kValues, unit, &std::pair<const char*, double>::first);
   return found == std::end(kValues) ? 1.0 : found->second;
 }
 
