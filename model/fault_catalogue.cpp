@@ -262,14 +262,13 @@ std::vector<FaultType> fault_catalogue(const Model& model, const Eigen::VectorXd
       all.push_back(fault_of(entry, {model, theta, effort, joint}));
     }
   };
-  for (const auto* from = entries.begin(); from != entries.end();) {
+  for (auto from = entries.begin(); from != entries.end();) {
     if (from->place != Place::each_joint) {
       add(*from, from->place == Place::left_wheel ? 1 : 0);
       ++from;
       continue;
     }
-    const auto* const to =
-        std::find_if(from, entries.end(), [](const Entry& e) { return e.place != Place::each_joint; });
+    const auto to = std::find_if(from, entries.end(), [](const Entry& e) { return e.place != Place::each_joint; });
     for (std::size_t j = 0; j < model.joints.size(); ++j) {
       std::for_each(from, to, [&](const Entry& entry) { add(entry, j); });
     }

@@ -259,7 +259,7 @@ double FleetSpread::quantile(double share) const {
     return std::numeric_limits<double>::quiet_NaN();
   }
   const auto rank =
-      static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * static_cast<double>(values.size() - 1) + 0.5);
+      static_cast<std::size_t>(std::lround(std::clamp(share, 0.0, 1.0) * static_cast<double>(values.size() - 1)));
   return core::order_statistic(values, rank);
 }
 
