@@ -28,7 +28,8 @@ namespace wheelwright::app {
 
 namespace {
 
-int output_error = 0;  // errno of the first failure of standard output
+// errno of the first failure of standard output, of which a process has one
+int output_error = 0;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
 
 void put(std::FILE* stream, std::string_view text) {
   errno = 0;

@@ -117,7 +117,7 @@ design::DesignSubject subject_of(const Arguments& a, const std::optional<OnlineM
   const std::string limits = missing_limits(a, robot);
   const std::string file = (model ? a.model : a.robot).string();
   try {
-    const design::DesignSubject subject = model ? design::subject_of(*model) : design::subject_of(robot, 1.0 / a.rate);
+    design::DesignSubject subject = model ? design::subject_of(*model) : design::subject_of(robot, 1.0 / a.rate);
     if (limits.empty()) {
       return subject;
     }

@@ -114,7 +114,7 @@ Run add_robot(CLI::App& program) {
       ->type_name("LINK")
       ->allow_extra_args(false);
   command.add_option("--name", a->hints.name, "Name of the robot")->type_name("NAME");
-  const Run added = finish(command, a, kExamples, run);
+  Run added = finish(command, a, kExamples, run);
   command.get_option("--out")->description("Write robot.yaml into this directory");
   return added;
 }

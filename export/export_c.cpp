@@ -171,9 +171,10 @@ class Writer {
     const auto columns = measurement_.columns();
     line("/* {}.h: on-line fault detector.", options_.name);
     line(" *");
-    if (!options_.software.empty())
+    if (!options_.software.empty()) {
       line(" * Written by {}{}; do not edit.", plain(options_.software),
            options_.source.empty() ? "" : " from " + plain(options_.source));
+    }
     line(" * Robot: {} ({}).", plain(options_.robot.empty() ? "unnamed" : options_.robot), plain(model_.name));
     line(" * Filter: order {}, alpha = {} 1/s, beta = {} 1/s.", filter_.design().order, filter_.design().alpha,
          filter_.design().beta);
