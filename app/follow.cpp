@@ -68,10 +68,15 @@ class LineFile {
   LineFile(std::filesystem::path path, bool fresh) : path_(std::move(path)) {
     if (fresh) {
       take();
-      std::filesystem::remove(path_);
+      std::error_code left;  // what stays is told when it is opened
+      std::filesystem::remove(path_, left);
     }
     do {
+      errno = 0;
       file_ = std::ofstream(path_, std::ios::app | std::ios::binary);
+      if (!file_) {
+        cannot_write(errno);
+      }
       take();
     } while (lock_->gone());
     std::error_code error;
@@ -91,13 +96,16 @@ class LineFile {
       const int why = errno;
       file_.close();
       cut();
-      throw InputError(fmt::format("{}: cannot be written ({}): expected a writable place with room on the disk",
-                                   path_.string(), std::strerror(why)));
+      cannot_write(why);
     }
     size_ += line.size() + 1;
   }
 
  private:
+  [[noreturn]] void cannot_write(int why) const {
+    throw InputError(fmt::format("{}: cannot be written ({}): expected a writable place with room on the disk",
+                                 path_.string(), std::strerror(why)));
+  }
   void take() {
     lock_.reset();
     lock_ = std::make_unique<files::PathLock>(path_, files::PathLock::Kind::alone);

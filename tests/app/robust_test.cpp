@@ -384,6 +384,12 @@ TEST_F(Robust, AFileOfEventsHasOneWriter) {
   EXPECT_EQ(bytes(path("watch/events.jsonl")), kept);
   EXPECT_EQ(run(follow, "log.csv").code, 0);
   EXPECT_EQ(bytes(path("watch/events.jsonl")), kept + kept);
+
+  std::filesystem::remove(path("watch/events.jsonl"));
+  std::filesystem::create_directories(path("watch/events.jsonl/mine"));
+  const Outcome none = run(follow + " --force", "log.csv");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_THAT(none.err, HasSubstr("watch/events.jsonl: cannot be written (Is a directory)"));
 }
 
 }  // namespace
