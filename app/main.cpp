@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <csignal>
 #include <exception>
+#include <filesystem>
 #include <memory>
 #include <new>
 #include <sstream>
@@ -120,6 +121,10 @@ int run(int argc, char** argv) {
     return kBadInput;
   } catch (const wheelwright::Error& error) {
     tell_error(error.what());
+    return kBadInput;
+  } catch (const std::filesystem::filesystem_error& error) {
+    tell_error(fmt::format("{}: {}: expected a file or directory that can be read and written", error.path1().string(),
+                           error.code().message()));
     return kBadInput;
   } catch (const std::bad_alloc&) {
     tell("wheelwright: not enough memory for this input: expected a shorter log, fewer threads or a larger machine\n");

@@ -106,6 +106,13 @@ TEST_F(Out, WhatAnEarlierRunWroteBesideItsResultGoesWithIt) {
   EXPECT_TRUE(fs::exists(path("robot.yaml")));
 }
 
+// What the system refuses was called a bug of the program.
+TEST_F(Out, ANameThatTheSystemRefusesIsBadInput) {
+  const Outcome outcome = run("try '" + (examples() / "healthy.csv.gz").string() + "' --out " + std::string(300, 'a'));
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("aaa/robot.yaml: File name too long"), ::testing::Not(HasSubstr("bug"))));
+}
+
 // Two runs at once left the page of one beside the result of the other. This one waits in the middle of writing, for a
 // reader of its page.
 TEST_F(Out, AnotherRunIsRefusedWhileOneWrites) {
