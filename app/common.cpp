@@ -264,19 +264,25 @@ void create_out(const CommonOptions& options) {
 }
 
 std::unique_ptr<files::PathLock> locked(const CommonOptions& options, files::PathLock::Kind kind) {
-  auto lock = std::make_unique<files::PathLock>(options.out, kind);
+  const std::string shown = "--out " + options.out.string();
+  auto lock = lock_or_refuse(options.out, kind, shown);
   while (lock->gone()) {  // a run that failed removed what it had made
     create_out(options);
-    lock = std::make_unique<files::PathLock>(options.out, kind);
-  }
-  if (lock->taken()) {
-    throw InputError("--out " + options.out.string() +
-                     ": another run is writing into it: wait until that has ended, or choose another --out");
+    lock = lock_or_refuse(options.out, kind, shown);
   }
   return lock;
 }
 
 }  // namespace
+
+std::unique_ptr<files::PathLock> lock_or_refuse(const std::filesystem::path& path, files::PathLock::Kind kind,
+                                                const std::string& shown) {
+  auto lock = std::make_unique<files::PathLock>(path, kind);
+  if (lock->taken() && !lock->gone()) {
+    throw InputError(shown + ": another run is writing into it: wait until that has ended, or choose another --out");
+  }
+  return lock;
+}
 
 void make_directory(const CommonOptions& options, const std::vector<std::string>& files, files::PathLock::Kind lock) {
   if (options.out.empty()) {

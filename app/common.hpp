@@ -128,6 +128,10 @@ void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesy
 /// until the program ends: InputError where another one writes results into it, unless both share it.
 void make_directory(const CommonOptions& options, const std::vector<std::string>& files = {},
                     files::PathLock::Kind lock = files::PathLock::Kind::alone);
+/// The lock of `path`, which may have been removed (PathLock::gone()); InputError, calling it `shown`, where another run
+/// has what is there.
+[[nodiscard]] std::unique_ptr<files::PathLock> lock_or_refuse(const std::filesystem::path& path,
+                                                              files::PathLock::Kind kind, const std::string& shown);
 /// Removes what make_directory() made and nothing was put into: a run that failed leaves no empty directories.
 void remove_empty_directories();
 

@@ -108,11 +108,7 @@ class LineFile {
   }
   void take() {
     lock_.reset();
-    lock_ = std::make_unique<files::PathLock>(path_, files::PathLock::Kind::alone);
-    if (lock_->taken()) {
-      throw InputError(path_.string() +
-                       ": another run is writing into it: wait until that has ended, or choose another --out");
-    }
+    lock_ = lock_or_refuse(path_, files::PathLock::Kind::alone, path_.string());
   }
   // Bytes up to the end of the last whole line.
   [[nodiscard]] std::uintmax_t whole_lines() const {

@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -189,12 +190,12 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t
     return fmt::format("has {} values: expected at most {}", rows, most_rows);
   }
   const hsize_t stored = H5Dget_storage_size(dataset);
-  if (rows > 0 && layout != H5D_VIRTUAL && H5Pget_external_count(how.get()) == 0 && stored == 0) {
+  const bool here = layout != H5D_VIRTUAL && H5Pget_external_count(how.get()) == 0;
+  if (rows > 0 && here && stored == 0) {
     return fmt::format("has {} values, none of which was written", rows);
   }
   // The library reads on behind values that stand in a header.
-  if ((layout == H5D_COMPACT || (layout == H5D_CONTIGUOUS && H5Pget_external_count(how.get()) == 0)) &&
-      stored / width < rows) {
+  if (here && layout != H5D_CHUNKED && stored / width < rows) {
     return fmt::format("has {} values of {} bytes in {} bytes: the file is damaged", rows, width, stored);
   }
   return {};
@@ -621,11 +622,12 @@ class Hdf5File final : public RowFile {
     choice_ =
         DatasetChooser(path_.string(), options, list_sources(file.get(), path_, options.trust), size_of(file.get()))
             .choose();
+    std::set<std::string> looked_at;  // members of a compound type share their pieces
     for (const auto& [name, source] : choice_.found) {
       if (name != "t") {
         names_.push_back(name);
       }
-      if (!options.trust) {
+      if (!options.trust && looked_at.insert(source.path).second) {
         refuse_unwritten(file.get(), source);
       }
     }

@@ -45,11 +45,15 @@ def commands(folders):
     return wanted
 
 
+def clang_options(command):
+    """What a command of GCC says to clang: without compiler and output, with the source."""
+    at = command.index("-o")
+    return [each for each in command[1:at] + command[at + 2:] if each != "-c" and each not in OURS_TO_GCC]
+
+
 def compile_alone(clang, file, directory, command):
     """Messages; empty where it compiles."""
-    at = command.index("-o")
-    options = [each for each in command[1:at] + command[at + 2:] if each != "-c" and each not in OURS_TO_GCC]
-    done = subprocess.run([clang, *options, f"-I{MADE}", "-fsyntax-only", "-ferror-limit=3"], cwd=directory, capture_output=True,
+    done = subprocess.run([clang, *clang_options(command), f"-I{MADE}", "-fsyntax-only", "-ferror-limit=3"], cwd=directory, capture_output=True,
                           text=True, check=False)
     return done.stderr if done.returncode else ""
 

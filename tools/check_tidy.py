@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """clang-tidy over what build/ compiles, a dozen files at once.
 
-    check_tidy.py [FOLDER...]    folders of this repository (bounds, logs, ...); without one all but tests, fuzz and bench
+    check_tidy.py [FOLDER...]    folders of this repository (bounds, logs, ...); without one all but
+                                  tests, fuzz, bench and examples
 
 Checks, and why some are left out, stand in .clang-tidy. build/ has to be built: its unity sources are read, since most of
 the time goes into the headers of libraries, and these are then read once for twelve files. Exit code 1 where something is found,
@@ -19,6 +20,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from check_alone import clang_options
+
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 LEFT_OUT = ("tests", "fuzz", "bench", "examples")
@@ -34,10 +37,8 @@ def commands(folders):
         folder = source.relative_to(BUILD if BUILD in source.parents else ROOT).parts[0]
         if (folder not in folders if folders else folder in LEFT_OUT) or "cmake_pch" in source.name:
             continue
-        at = command.index("-o")
-        options = [each for each in command[1:at] + command[at + 2:]
-                   if each not in ("-c", "-include", "-Winvalid-pch", "-Wno-subobject-linkage", entry["file"])
-                   and "cmake_pch" not in each]
+        options = [each for each in clang_options(command)
+                   if each not in ("-include", "-Winvalid-pch", entry["file"]) and "cmake_pch" not in each]
         yield source, entry["directory"], options
 
 

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numbers>
+#include <numeric>
 #include <random>
 #include <span>
 #include <string>
@@ -602,6 +604,31 @@ TEST_F(LogFile, ADatasetWithDamagedAttributesIsRefused) {
   }
 }
 
+/// A file of HDF5 with a dataset for each column, of this type and made as `how` says; of the last column the `places`
+/// values from `left_out` on are not written.
+void write_columns(const std::filesystem::path& path,
+                   const std::vector<std::pair<std::string, std::vector<double>>>& columns, hid_t type,
+                   const std::function<void(hid_t)>& how = {}, hsize_t left_out = 0, hsize_t places = 0) {
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t made = H5Pcreate(H5P_DATASET_CREATE);
+  if (how) {
+    how(made);
+  }
+  for (const auto& [name, values] : columns) {
+    const hsize_t rows = values.size();
+    const hid_t space = H5Screate_simple(1, &rows, nullptr);
+    const hid_t data = H5Dcreate2(file, name.c_str(), type, space, H5P_DEFAULT, made, H5P_DEFAULT);
+    if (places > 0 && name == columns.back().first) {
+      H5Sselect_hyperslab(space, H5S_SELECT_NOTB, &left_out, nullptr, &places, nullptr);
+    }
+    EXPECT_GE(H5Dwrite(data, H5T_NATIVE_DOUBLE, space, space, H5P_DEFAULT, values.data()), 0);
+    H5Dclose(data);
+    H5Sclose(space);
+  }
+  H5Pclose(made);
+  H5Fclose(file);
+}
+
 // The library brings bytes back in order by the size that the file gives, and one changed bit made numbers of others.
 TEST_F(LogFile, ADatasetShuffledInAnotherSizeIsRefused) {
   std::string content = bytes(write("whole.h5", drive()));
@@ -656,23 +683,14 @@ TEST_F(LogFile, NumbersOfAnHdf5FileHaveAFormatOfMachines) {
   }
   EXPECT_LE(read_otherwise, 1U) << "the order of bytes cannot be told from another";
 
-  const hsize_t rows = 64;
+  std::vector<double> t(64), omega(64);
+  for (std::size_t k = 0; k < t.size(); ++k) {
+    t[k] = static_cast<double>(k);
+    omega[k] = static_cast<double>(k % 7);
+  }
   for (const hid_t type : {H5T_IEEE_F32LE, H5T_IEEE_F32BE, H5T_IEEE_F64BE, H5T_NATIVE_LDOUBLE, H5T_STD_I16BE,
                            H5T_STD_I64LE, H5T_STD_U32LE, H5T_STD_I8LE}) {
-    const hid_t file = H5Fcreate(path("a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-    const hid_t space = H5Screate_simple(1, &rows, nullptr);
-    std::vector<double> t(rows), omega(rows);
-    for (std::size_t k = 0; k < rows; ++k) {
-      t[k] = static_cast<double>(k);
-      omega[k] = static_cast<double>(k % 7);
-    }
-    for (const auto& [name, column] : {std::pair{"t", &t}, {"omega_r", &omega}}) {
-      const hid_t data = H5Dcreate2(file, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-      EXPECT_GE(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, column->data()), 0);
-      H5Dclose(data);
-    }
-    H5Sclose(space);
-    H5Fclose(file);
+    write_columns(path("a.h5"), {{"t", t}, {"omega_r", omega}}, type);
     EXPECT_EQ(read({path("a.h5")}).column("omega_r"), omega);
   }
 }
@@ -707,25 +725,12 @@ TEST_F(LogFile, WhatIsNamedLikeAColumnAndIsNoneIsSaid) {
 
 // The library read what stands in memory behind them.
 TEST_F(LogFile, ValuesInAHeaderAreAsManyAsItHolds) {
-  const hsize_t rows = 64;
-  const auto make = [&](H5D_layout_t layout) {
-    const hid_t file = H5Fcreate(path("a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-    const hid_t how = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(1, &rows, nullptr);
-    H5Pset_layout(how, layout);
-    for (const char* const name : {"t", "omega_r"}) {
-      std::vector<double> values(rows);
-      std::iota(values.begin(), values.end(), 0.0);
-      const hid_t data = H5Dcreate2(file, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, how, H5P_DEFAULT);
-      EXPECT_GE(H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
-      H5Dclose(data);
-    }
-    H5Sclose(space);
-    H5Pclose(how);
-    H5Fclose(file);
-  };
+  std::vector<double> values(64);
+  std::iota(values.begin(), values.end(), 0.0);
   for (const H5D_layout_t layout : {H5D_COMPACT, H5D_CONTIGUOUS}) {
-    make(layout);
-    EXPECT_EQ(read({path("a.h5")}).t.size(), rows);
+    write_columns(path("a.h5"), {{"t", values}, {"omega_r", values}}, H5T_IEEE_F64LE,
+                  [&](hid_t how) { H5Pset_layout(how, layout); });
+    EXPECT_EQ(read({path("a.h5")}).t.size(), values.size());
     std::string content = bytes(path("a.h5"));
     // 64 values become 1,088, in both extents of a dataspace.
     for (std::size_t at = 0;
@@ -743,31 +748,14 @@ TEST_F(LogFile, PiecesOfHdf5ThatWereNeverWrittenAreRefused) {
   const hsize_t piece = 10, rows = table.t.size();
   ASSERT_GT(rows, 3 * piece);
   const auto make = [&](hsize_t left_out, hsize_t places) {
-    const hid_t file = H5Fcreate(path("a.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-    const hid_t how = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(1, &rows, nullptr);
-    H5Pset_chunk(how, 1, &piece);
-    for (const char* const name : {"t", "omega_r"}) {
-      const std::vector<double>& values = std::string_view(name) == "t" ? table.t : table.column(name);
-      const hid_t data = H5Dcreate2(file, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, how, H5P_DEFAULT);
-      for (hsize_t first = 0; first < rows; first += piece) {
-        const hsize_t count = std::min(piece, rows - first);
-        const hid_t memory = H5Screate_simple(1, &count, nullptr);
-        H5Sselect_hyperslab(space, H5S_SELECT_SET, &first, nullptr, &count, nullptr);
-        if (name[0] == 't' || first < left_out || first >= left_out + places) {
-          EXPECT_GE(H5Dwrite(data, H5T_NATIVE_DOUBLE, memory, space, H5P_DEFAULT, values.data() + first), 0);
-        }
-        H5Sclose(memory);
-      }
-      H5Dclose(data);
-    }
-    H5Sclose(space);
-    H5Pclose(how);
-    H5Fclose(file);
+    write_columns(
+        path("a.h5"), {{"t", table.t}, {"omega_r", table.column("omega_r")}}, H5T_IEEE_F64LE,
+        [&](hid_t how) { H5Pset_chunk(how, 1, &piece); }, left_out, places);
   };
   make(0, 0);
   EXPECT_EQ(read({path("a.h5")}).column("omega_r"), table.column("omega_r"));
   for (const hsize_t left_out : {hsize_t{0}, 2 * piece, (rows - 1) / piece * piece}) {
-    make(left_out, piece);
+    make(left_out, std::min(piece, rows - left_out));
     EXPECT_THAT(
         input_error([&] { read({path("a.h5")}); }),
         AllOf(HasSubstr(fmt::format("a.h5: /omega_r has {} values, of which row {} and others", rows, left_out + 1)),
