@@ -54,6 +54,35 @@ for compression in none zstd lz4; do
   "$program" convert csv/drive.csv "mcap/$compression.mcap" --compression "$compression" --quiet
 done
 
+# Short ones, by the writers of the second reader: bytes of little else than what is read.
+python3 - "$house/tests/second_reader" "$folder" <<'EOF'
+import pathlib
+import sqlite3
+import sys
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, sys.argv[1])
+import hdf5
+import run
+
+folder = pathlib.Path(sys.argv[2])
+stamps = [1_700_000_000 * 10**9 + k * 10_000_000 for k in range(6)]
+speeds = [(stamp, run.encode(stamp, (), (k, -k), (0.5, k))) for k, stamp in enumerate(stamps)]
+angles = [(stamp, run.encode(stamp, (2.5 * k, -k), (), (0.5, k), ">")) for k, stamp in enumerate(stamps)]
+others = (("/chatter", "std_msgs/msg/String", "string data\n", b"\0\1\0\0\3\0\0\0hi\0"),)
+run.write_mcap(folder / "mcap/speeds.mcap", speeds, False)
+run.write_mcap(folder / "mcap/angles.mcap", angles, True, others)
+for name, messages in ("speeds", speeds), ("angles", angles):
+    path = folder / f"db3/{name}.db3"
+    run.write_db3(path, messages, others)
+    base = sqlite3.connect(path, isolation_level=None)
+    base.executescript("PRAGMA page_size=512; VACUUM;")
+    base.close()
+columns = {name: [0.25 * k for k in range(6)] for name in ("t", "omega_r", "omega_l", "tau_r", "tau_l")}
+hdf5.write(folder / "hdf5/plain.h5", columns)
+hdf5.write(folder / "hdf5/pieces.h5", columns, 4)
+EOF
+
 # What SQLite leaves beside a recording: a write-ahead log (after an even byte), a journal (after an odd one).
 python3 - "$folder" <<'EOF'
 import pathlib

@@ -92,7 +92,11 @@ std::string format_defect(hid_t type) {
   } else if (H5Tget_class(type) == H5T_INTEGER) {
     usual = usual && precision == bits;
   }
-  return usual ? "" : fmt::format("has numbers of {} bits in a format that no machine has: the file is damaged", bits);
+  return usual ? ""
+               : fmt::format(
+                     "has numbers of {} bits in a format that no machine has: the file is damaged, or its numbers "
+                     "take only some of their bits: expected whole integers or floats of IEEE 754",
+                     bits);
 }
 
 /// The text of attribute `units` or `unit`; empty where there is none. Nothing where the attributes are damaged: the
@@ -276,32 +280,55 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
   }
 }
 
+/// The column that the last name of a path is like; null where it is like none.
+const LogColumn* column_of(std::string_view path) { return recognise_log_column(path.substr(path.rfind('/') + 1)); }
+
 /// All columns of the file `name`, in the order of their paths.
 std::vector<Source> list_sources(hid_t file, const std::filesystem::path& name, bool trust) {
   struct Found {
     std::vector<std::pair<std::string, haddr_t>> datasets;
     std::vector<Source> others;
-    std::size_t objects = 0;
+    std::set<std::string> named;  // like a column
+    std::size_t objects = 0, links = 0;
     bool too_deep = false;
   } found;
   const auto visit = [](hid_t, const char* found_name, const H5O_info_t* info, void* to) -> herr_t {
     auto& all = *static_cast<Found*>(to);
     const std::string_view path(found_name);
     all.too_deep = std::ranges::count(path, '/') >= deepest_group;
+    const bool like_column = column_of(path) != nullptr;
     if (info->type == H5O_TYPE_DATASET) {
       all.datasets.emplace_back(fmt::format("/{}", path), info->addr);
-    } else if (info->type != H5O_TYPE_GROUP && recognise_log_column(path.substr(path.rfind('/') + 1)) != nullptr) {
+    } else if (info->type != H5O_TYPE_GROUP && like_column) {
       all.others.push_back({fmt::format("/{}", path), "", "", 0, 0, "is no dataset: the file is damaged"});
+    }
+    if (like_column) {
+      all.named.emplace(path);
     }
     return ++all.objects <= most_objects && !all.too_deep ? 0 : 1;
   };
-  if (H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, visit, &found, H5O_INFO_BASIC) < 0) {
+  // Links to a name, to another file or to a dataset that has been listed by another name.
+  const auto visit_link = [](hid_t, const char* path, const H5L_info_t*, void* to) -> herr_t {
+    auto& all = *static_cast<Found*>(to);
+    if (const LogColumn* column = column_of(path); column != nullptr && !all.named.contains(path)) {
+      all.others.push_back({.path = fmt::format("/{}", path),
+                            .member = "",
+                            .unit = "",
+                            .unlike = fmt::format("is a link, or another name of a dataset: expected a dataset, or "
+                                                  "--map {}=/GROUP/DATASET of that it leads to",
+                                                  column->name)});
+    }
+    return ++all.links <= most_objects ? 0 : 1;
+  };
+  if (H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, visit, &found, H5O_INFO_BASIC) < 0 ||
+      (found.objects <= most_objects && !found.too_deep &&
+       H5Lvisit(file, H5_INDEX_NAME, H5_ITER_INC, visit_link, &found) < 0)) {
     throw InputError(fmt::format(
         "{}: is damaged: the HDF5 library lists {} datasets and finds no way to others: expected a whole HDF5 "
         "file, closed by its writer",
         name.string(), found.datasets.size()));
   }
-  if (found.too_deep || found.objects > most_objects) {
+  if (found.too_deep || std::max(found.objects, found.links) > most_objects) {
     throw InputError(fmt::format("{}: {}: expected a log, with at most {} objects in groups at most {} deep",
                                  name.string(),
                                  found.too_deep ? "its groups lie too deep in each other" : "has too many objects",
@@ -438,10 +465,15 @@ class DatasetChooser {
       }
     }
     if (homes.empty()) {
+      const auto unlike = std::ranges::find_if(sources_, [](const Source& source) {
+        const LogColumn* column = source.unlike.empty() ? nullptr : meaning_of(source);
+        return column != nullptr && column->name == "t";
+      });
       throw InputError(fmt::format(
           "{}: no dataset of times: expected one called t, time or the like (in s) beside the columns, or --map "
-          "t=/GROUP/DATASET: the file has {}",
-          path_, choice_.header.empty() ? "no one-dimensional numeric dataset" : core::listed(choice_.header)));
+          "t=/GROUP/DATASET: the file has {}{}",
+          path_, choice_.header.empty() ? "no one-dimensional numeric dataset" : core::listed(choice_.header),
+          unlike == sources_.end() ? "" : fmt::format("; {} {}", unlike->shown(), unlike->unlike)));
     }
     if (homes.size() > 1) {
       choice_.notes.push_back(fmt::format(

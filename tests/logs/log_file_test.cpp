@@ -723,6 +723,42 @@ TEST_F(LogFile, WhatIsNamedLikeAColumnAndIsNoneIsSaid) {
   EXPECT_THAT(input_error([&] { read({path("a.h5")}, options); }), HasSubstr("/omega_r has 2 dimensions: expected 1"));
 }
 
+TEST_F(LogFile, ALinkLikeAColumnIsSaidAndNotFollowed) {
+  const LogTable table = drive();
+  {
+    Hdf5File file(path("a.h5"));
+    for (const char* name : {"raw_t", "raw_l", "raw_r", "tau_l"}) {
+      file.put(name, name == std::string("raw_t") ? table.t : table.column("omega_l"), "");
+    }
+  }
+  const auto link = [&](const char* name, const char* to, bool soft) {
+    const hid_t file = H5Fopen(path("a.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    if (soft) {
+      H5Lcreate_soft(to, file, name, H5P_DEFAULT, H5P_DEFAULT);
+    } else {
+      H5Lcreate_hard(file, to, file, name, H5P_DEFAULT, H5P_DEFAULT);
+    }
+    H5Fclose(file);
+  };
+  link("time", "/raw_t", true);
+  EXPECT_THAT(input_error([&] { read({path("a.h5")}); }),
+              AllOf(HasSubstr("no dataset of times"), HasSubstr("/time is a link"), HasSubstr("--map t=")));
+
+  link("omega_l", "/raw_l", true);
+  link("omega_r", "/raw_r", false);  // raw_r comes behind it: the dataset is listed by the name of a column
+  link("tau_r", "/nothing", true);
+  LogOptions options;
+  options.map = {{"t", "/raw_t"}};
+  EXPECT_THAT(read({path("a.h5")}, options).names, ::testing::UnorderedElementsAre("omega_r", "tau_l"));
+  EXPECT_THAT(report.files[0].notes,
+              ::testing::UnorderedElementsAre(::testing::StartsWith("/omega_l was not taken as omega_l: it is a link"),
+                                              ::testing::StartsWith("/tau_r was not taken as tau_r: it is a link")));
+  options.map["omega_l"] = "/omega_l";
+  EXPECT_THAT(input_error([&] { read({path("a.h5")}, options); }), HasSubstr("/omega_l is a link"));
+  options.map["omega_l"] = "/raw_l";
+  EXPECT_EQ(read({path("a.h5")}, options).column("omega_l"), table.column("omega_l"));
+}
+
 // The library read what stands in memory behind them.
 TEST_F(LogFile, ValuesInAHeaderAreAsManyAsItHolds) {
   std::vector<double> values(64);
