@@ -33,6 +33,9 @@ std::string short_name(const std::string& name) {
   return middle == std::string::npos ? name : name.substr(0, middle) + name.substr(middle + 4);
 }
 
+/// What a type without fields has on the wire.
+RosField stand_in() { return {.name = "structure_needs_at_least_one_member"}; }
+
 }  // namespace
 
 std::string full_ros_name(std::string_view type_name) {
@@ -64,10 +67,10 @@ std::string ros_definition_text(const RosDefinition& definition) {
     if (&message != &definition.messages.front()) {
       text += fmt::format("{:=<80}\nMSG: {}\n", "", short_name(message.name));
     }
+    if (message.fields == std::vector<RosField>{stand_in()}) {
+      continue;
+    }
     for (const RosField& field : message.fields) {
-      if (field.name == "structure_needs_at_least_one_member") {
-        continue;
-      }
       text += field.kind == RosKind::message ? short_name(definition.messages[field.message].name)
                                              : std::string(type_words[static_cast<std::size_t>(field.kind)]);
       if (field.longest > 0) {
@@ -400,7 +403,7 @@ struct Assembler {
       fields.push_back(std::move(field));
     }
     if (fields.empty()) {
-      fields.push_back({"structure_needs_at_least_one_member"});
+      fields.push_back(stand_in());
     }
     open.pop_back();
     definition.messages[place].fields = std::move(fields);

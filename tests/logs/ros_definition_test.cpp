@@ -81,6 +81,16 @@ TEST(RosDefinition, EmptyTypesHaveTheFieldThatTheyHaveOnTheWire) {
   EXPECT_EQ(definition.messages[0].fields[0].kind, RosKind::uint8);
 }
 
+// Found by the fuzzer of messages: the field was left out of the text for its name alone.
+TEST(RosDefinition, AFieldNamedAsThatOfAnEmptyTypeStaysWhereItIsNone) {
+  const std::string name = "structure_needs_at_least_one_member\n";
+  for (const std::string& fields : {"float64 x\nuint8 " + name, "float64 " + name, "uint8[3] " + name}) {
+    const auto definition = parse_ros_definition("a/msg/B", fields);
+    EXPECT_EQ(ros_definition_text(definition), fields);
+  }
+  EXPECT_EQ(ros_definition_text(parse_ros_definition("a/msg/B", "uint8 " + name)), "");
+}
+
 TEST(RosDefinition, BundledTypesAreWholeAndReadBack) {
   for (const char* const name : {"sensor_msgs/msg/JointState",
                                  "sensor_msgs/Imu",
