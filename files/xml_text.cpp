@@ -11,7 +11,8 @@
 namespace wheelwright::files {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\n";
+// What TinyXML-2 takes for white space.
+constexpr std::string_view kBlanks = " \t\r\n\v\f";
 
 bool is_blank(char c) { return kBlanks.find(c) != std::string_view::npos; }
 
@@ -82,7 +83,7 @@ void XmlText::scan() {
       at = behind(">", at);
     } else if (rest.starts_with("</")) {
       const std::size_t end = behind(">", at);
-      const std::string_view name = text.substr(at + 2, text.find_first_of(" \t\r\n>", at + 2) - at - 2);
+      const std::string_view name = text.substr(at + 2, text.find_first_of(" \t\r\n\v\f>", at + 2) - at - 2);
       if (open.empty() || elements_[open.back()].name != name) {
         fail(at, "an end tag without its start");
       }
@@ -97,7 +98,7 @@ void XmlText::scan() {
       Element element;
       element.line = line;
       element.begin = at;
-      std::size_t k = std::min(text.find_first_of(" \t\r\n/>", at + 1), text.size());
+      std::size_t k = std::min(text.find_first_of(" \t\r\n\v\f/>", at + 1), text.size());
       element.name = std::string(text.substr(at + 1, k - at - 1));
       element.insert_at = k;
       if (element.name.empty()) {
@@ -111,7 +112,7 @@ void XmlText::scan() {
         if (text[k] == '>' || text[k] == '/') {
           break;
         }
-        const std::size_t name_end = text.find_first_of(" \t\r\n=", k);
+        const std::size_t name_end = text.find_first_of(" \t\r\n\v\f=", k);
         const std::size_t equals =
             name_end == std::string_view::npos ? name_end : text.find_first_not_of(kBlanks, name_end);
         const std::size_t quote = equals == std::string_view::npos || text[equals] != '='

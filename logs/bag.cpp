@@ -214,9 +214,12 @@ class Bag final : public BagReader {
     const auto& own = source_->topics();
     while (places_.size() < own.size()) {
       const bag::SourceTopic& topic = own[places_.size()];
-      const auto [same, added] = topic_places_.try_emplace({topic.name, topic.type, topic.encoding}, topics_.size());
-      places_.push_back(same->second);
-      if (added) {
+      std::vector<std::size_t>& alike = topic_places_[{topic.name, topic.type, topic.encoding}];
+      if (const auto same = same_of(topic, alike); same != alike.end()) {
+        places_.push_back(*same);
+      } else {
+        alike.push_back(topics_.size());
+        places_.push_back(topics_.size());
         if (topics_.size() == most_read_topics) {
           throw InputError(fmt::format("{}: more than {} topics: expected a recording of one robot",
                                        source_->report().path, most_read_topics));
@@ -224,6 +227,18 @@ class Bag final : public BagReader {
         topics_.push_back(described(topic, places_.size() - 1));
       }
     }
+  }
+
+  /// Which of those of one name and type has the same fields: a recording may bring another definition of a type.
+  std::vector<std::size_t>::const_iterator same_of(const bag::SourceTopic& topic,
+                                                   const std::vector<std::size_t>& alike) {
+    const bool own = topic.encoding == "cdr" && topic.schema_encoding == "ros2msg" && topic.schema != nullptr &&
+                     !topic.schema->empty();
+    const auto definition = own && !alike.empty() ? definition_of(topic).definition : nullptr;
+    return std::ranges::find_if(alike, [&](std::size_t k) {
+      const auto& known = topics_[k].definition;
+      return definition == nullptr || known == nullptr || known->messages == definition->messages;
+    });
   }
 
   BagTopic described(const bag::SourceTopic& topic, std::size_t place) {
@@ -336,7 +351,7 @@ class Bag final : public BagReader {
   std::vector<std::size_t> places_;  ///< of its topics in topics_
   std::size_t at_ = 0;               ///< the file that is being read
   std::vector<BagTopic> topics_;
-  std::map<std::array<std::string, 3>, std::size_t> topic_places_;  ///< by name, type and encoding
+  std::map<std::array<std::string, 3>, std::vector<std::size_t>> topic_places_;  ///< by name, type and encoding
   mutable std::vector<BagReport> reports_;
   bag::MessageUnpacker unpacker_;
   std::uint64_t unpacked_wrong_ = 0;

@@ -56,7 +56,8 @@ class BagReader {
  public:
   virtual ~BagReader() = default;
 
-  /// Those met so far, which may become more while reading; places stay. A name with two types is two topics.
+  /// Those met so far, which may become more while reading; places stay. A name with two types, or
+  /// two definitions of one, is two topics.
   [[nodiscard]] virtual const std::vector<BagTopic>& topics() const = 0;
   /// The next message in the order of the files and of the recording in them, which need not be that of time; false at
   /// the end. Damage is no error but is reported; throws InputError, naming the file, when the disk cannot be read.

@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -111,6 +112,7 @@ struct Offer {
   std::size_t topic = 0;
   BagColumn column;
   int rank = 0;
+  bool other_joints = false;  ///< of joints that may be no wheels
 };
 
 class Chooser {
@@ -129,6 +131,7 @@ class Chooser {
       offer_from(k);
     }
     leave_other_axes();
+    leave_other_joints();
     take_offers();
     order_sources();
     return std::move(choice_);
@@ -228,7 +231,14 @@ class Chooser {
       return;
     }
     const std::string& type = own.type;
-    if (type == "sensor_msgs/msg/JointState") {
+    const bool pose = type.starts_with("geometry_msgs/msg/PoseStamped") ||
+                      type.starts_with("geometry_msgs/msg/PoseWithCovarianceStamped");
+    if ((pose || type == "sensor_msgs/msg/JointState") && is_wished(plain_name(own.name))) {
+      choice_.notes.push_back(fmt::format(
+          "{} ({}) was not taken: by its name it is what was wished for, no measurement; --map NAME={}.FIELD "
+          "takes it",
+          own.name, type, own.name));
+    } else if (type == "sensor_msgs/msg/JointState") {
       offer_joints(k);
     } else if (type == "geometry_msgs/msg/PoseStamped") {
       offer_pose(k, "pose", 1);
@@ -237,8 +247,7 @@ class Chooser {
     } else if (type == "nav_msgs/msg/Odometry") {
       offer_odometry(k);
     } else if (type == "sensor_msgs/msg/Imu") {
-      offer(k, "gyro_z", {"angular_velocity.z"}, 1);
-      offer(k, "accel_x", {"linear_acceleration.x"}, 1);
+      offer_imu(k);
     } else if (!is_of_ros(type)) {
       for (const auto& [column, field] : recognised_in(own.definition.get())) {
         offer(k, column->name, {field}, 0);
@@ -276,7 +285,34 @@ class Chooser {
   void offer_pose(std::size_t k, const std::string& pose, int rank) {
     offer(k, "x", {pose + ".position.x"}, rank);
     offer(k, "y", {pose + ".position.y"}, rank);
-    offer(k, "theta", yaw_fields(pose + ".orientation"), rank, BagColumn::Rule::yaw);
+    if (measures(k, "orientation")) {
+      offer(k, "theta", yaw_fields(pose + ".orientation"), rank, BagColumn::Rule::yaw);
+    } else {
+      choice_.notes.push_back(
+          fmt::format("{} has no orientation (a quaternion of zeros): there is no column theta of it", topic(k).name));
+    }
+  }
+
+  static bool is_wished(const std::string& plain) {
+    constexpr std::array<std::string_view, 8> words = {"goal",    "target", "setpoint", "initialpose",
+                                                       "command", "cmd",    "desired",  "initial_pose"};
+    return std::ranges::any_of(words, [&](std::string_view word) { return contains(plain, word); });
+  }
+
+  [[nodiscard]] bool measures(std::size_t k, std::string_view what) const {
+    return std::ranges::find(topics_[k].unmeasured, what) == topics_[k].unmeasured.end();
+  }
+
+  void offer_imu(std::size_t k) {
+    for (const auto& [column, measured, field] :
+         {std::tuple("gyro_z", "angular_velocity", "z"), {"accel_x", "linear_acceleration", "x"}}) {
+      if (measures(k, measured)) {
+        offer(k, column, {fmt::format("{}.{}", measured, field)}, 1);
+      } else {
+        choice_.notes.push_back(fmt::format("{} says that it does not measure {} (its covariance begins with -1)",
+                                            topic(k).name, measured));
+      }
+    }
   }
 
   void offer_odometry(std::size_t k) {
@@ -304,9 +340,17 @@ class Chooser {
         if (!filled(array)) {
           continue;
         }
-        std::vector<std::string> fields;
+        std::vector<std::string> fields, empty;
         for (const std::string& joint : joints) {
           fields.push_back(fmt::format("{}[{}]", array, joint));
+          if (!view.elements.empty() && std::ranges::find(view.elements, fields.back()) == view.elements.end()) {
+            empty.push_back(fields.back());
+          }
+        }
+        if (!empty.empty()) {
+          choice_.notes.push_back(fmt::format("{} has no number for {}: there is no column {} of it", view.topic->name,
+                                              core::listed(empty), column));
+          continue;
         }
         const BagColumn::Rule rule = joints.size() == 1 ? BagColumn::Rule::value
                                      : column == effort ? BagColumn::Rule::sum
@@ -332,25 +376,72 @@ class Chooser {
       return contains(plain, "wheel") && !contains(plain, "caster") && !contains(plain, "steer");
     });
     const std::vector<std::string>& joints = wheels.empty() ? view.names : wheels;
-    for (const std::string side : {"r", "l"}) {
-      std::vector<std::string> of_side;
-      std::ranges::copy_if(joints, std::back_inserter(of_side),
-                           [&](const std::string& name) { return side_of_joint(name) == side; });
-      const char* const word = side == "r" ? "right" : "left";
+    const std::vector<std::string> right = joints_of("r", joints), left = joints_of("l", joints);
+    if (const auto none = joints_of("", wheels); !none.empty() && right.size() != left.size()) {
+      choice_.notes.push_back(fmt::format(
+          "{} has wheels of no side by their names ({}), and {} on the right but {} on the left: none was taken; --map "
+          "omega_r={}.velocity[…] and the like choose",
+          view.topic->name, core::listed(none), right.size(), left.size(), view.topic->name));
+      return;
+    }
+    const std::size_t before = offers_.size();
+    for (const auto& [side, of_side] :
+         {std::pair<std::string, const std::vector<std::string>&>("r", right), {"l", left}}) {
       if (of_side.size() == 1 || (of_side.size() > 1 && !wheels.empty())) {
         give_side(of_side, side);
       }
       if (of_side.size() > 1) {
-        choice_.notes.push_back(
-            wheels.empty()
-                ? fmt::format("{} has {} {} joints ({}): none was taken; --map omega_{}={}.velocity[{}] and the like "
-                              "choose one",
-                              view.topic->name, of_side.size(), word, core::listed(of_side), side, view.topic->name,
-                              of_side.front())
-                : fmt::format("{}: the {} side is the mean motion and the sum of the efforts of {}", view.topic->name,
-                              word, core::listed(of_side, " and ")));
+        tell_side(*view.topic, side, of_side, !wheels.empty());
       }
     }
+    const bool driven = !wheels.empty() || std::ranges::all_of(view.names, [](const std::string& name) {
+      const std::string plain = plain_name(name);
+      return contains(plain, "motor") || contains(plain, "driv") || plain == "left" || plain == "right";
+    });
+    for (std::size_t at = before; at < offers_.size(); ++at) {
+      offers_[at].other_joints = !driven;
+    }
+  }
+
+  static std::vector<std::string> joints_of(const std::string& side, const std::vector<std::string>& joints) {
+    std::vector<std::string> found;
+    std::ranges::copy_if(joints, std::back_inserter(found),
+                         [&](const std::string& name) { return side_of_joint(name) == side; });
+    return found;
+  }
+
+  void tell_side(const BagTopic& own, const std::string& side, const std::vector<std::string>& joints, bool wheels) {
+    const char* const word = side == "r" ? "right" : "left";
+    choice_.notes.push_back(
+        wheels ? fmt::format("{}: the {} side is the mean motion and the sum of the efforts of {}", own.name, word,
+                             core::listed(joints, " and "))
+               : fmt::format("{} has {} {} joints ({}): none was taken; --map omega_{}={}.velocity[{}] and the like "
+                             "choose one",
+                             own.name, joints.size(), word, core::listed(joints), side, own.name, joints.front()));
+  }
+
+  /// Beside wheels, right and left joints of another topic that are named neither wheel, motor nor drive are an arm's or
+  /// a gripper's.
+  void leave_other_joints() {
+    const bool wheels = std::ranges::any_of(offers_, [](const Offer& offer) {
+      return !offer.other_joints && (offer.column.name.ends_with("_r") || offer.column.name.ends_with("_l"));
+    });
+    if (!wheels) {
+      return;
+    }
+    std::map<std::size_t, const Offer*> left;
+    for (const Offer& offer : offers_) {
+      if (offer.other_joints) {
+        left.try_emplace(offer.topic, &offer);
+      }
+    }
+    for (const auto& [k, first] : left) {
+      const BagColumn& column = first->column;
+      choice_.notes.push_back(
+          fmt::format("{} is of other joints than wheels, by their names, and was left out: --map {}={}.{} takes it",
+                      topic(k).name, column.name, topic(k).name, column.fields.front()));
+    }
+    std::erase_if(offers_, [](const Offer& offer) { return offer.other_joints; });
   }
 
   /// Beside wheels a topic with one joint is a gripper, an arm, a camera: its rows are no reason to interpolate wheels.
@@ -405,6 +496,7 @@ class Chooser {
       }
       if (rivals.size() == 1) {
         take(rivals.front()->topic, rivals.front()->column);
+        tell_passed_over(*rivals.front());
         continue;
       }
       std::vector<std::string> places;
@@ -418,6 +510,19 @@ class Chooser {
               ? rivals.front()->column.fields.front().substr(0, rivals.front()->column.fields.front().size() - 1) +
                     "yaw"
               : rivals.front()->column.fields.front()));
+    }
+  }
+
+  /// Says once for each topic that it was passed over for that of `taken`.
+  void tell_passed_over(const Offer& taken) {
+    for (const Offer& offer : offers_) {
+      if (offer.column.name == taken.column.name && offer.topic != taken.topic &&
+          std::ranges::find(passed_over_, offer.topic) == passed_over_.end()) {
+        passed_over_.push_back(offer.topic);
+        choice_.notes.push_back(fmt::format("{} of {} was taken before that of {}: --map {}={}.FIELD takes the other",
+                                            taken.column.name, topic(taken.topic).name, topic(offer.topic).name,
+                                            taken.column.name, topic(offer.topic).name));
+      }
     }
   }
 
@@ -441,6 +546,7 @@ class Chooser {
   BagChoice choice_;
   std::vector<Offer> offers_;
   std::vector<std::string> taken_;
+  std::vector<std::size_t> passed_over_;
   std::map<const RosDefinition*, Recognised> recognised_;
 };
 

@@ -102,6 +102,19 @@ fs::path named_part(const fs::path& directory, const std::string& name) {
   return !leaves && fs::exists(directory / inside, error) ? directory / inside : directory / fs::path(name).filename();
 }
 
+/// The recordings that lie in a directory and are none of `named`, in their order.
+std::vector<std::string> left_beside(const fs::path& directory, const std::set<fs::path>& named) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator at(directory, error), end; !error && at != end; at.increment(error)) {
+    if (!storage_ending(at->path().filename()).empty() && !named.contains(at->path())) {
+      names.push_back(at->path().filename().string());
+    }
+  }
+  std::sort(names.begin(), names.end(), core::natural_less);
+  return names;
+}
+
 }  // namespace
 
 Parts parts_of(const fs::path& path, bool trust) {
@@ -142,6 +155,10 @@ Parts parts_of(const fs::path& path, bool trust) {
       if (met.size() < found->files.size()) {
         parts.losses.push_back(fmt::format("{}: names {} files, {} of them again: each is read once", metadata.string(),
                                            found->files.size(), found->files.size() - met.size()));
+      }
+      if (const auto beside = left_beside(path, met); !beside.empty()) {
+        parts.losses.push_back(fmt::format("{}: does not name {}, which {} not read", metadata.string(),
+                                           core::listed(beside), beside.size() == 1 ? "was" : "were"));
       }
       parts.files.front().demanded = parts.files.size() == 1;
       parts.promised = found->messages;

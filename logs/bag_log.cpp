@@ -28,6 +28,9 @@ constexpr std::size_t looked_at = 20000;  ///< messages at least, for topics tha
 
 constexpr std::int64_t longest_late = one_second;
 
+constexpr std::size_t then_every = 100;  ///< of the later messages of a topic that names its elements
+
+constexpr std::string_view joint_state = "sensor_msgs/msg/JointState";
 constexpr std::array<const char*, 3> joint_arrays = {"position", "velocity", "effort"};
 
 /// Everything about a bag that one looks at before its rows are read.
@@ -35,10 +38,28 @@ struct BagPlan {
   std::filesystem::path path;
   BagOptions options;
   BagChoice choice;
-  std::vector<std::string> topics;         ///< name of each topic
-  std::vector<RosDefinition> definitions;  ///< of each source's messages: a reader may know its topics only later
-  BagClocks clocks;                        ///< of each source
+  std::vector<std::string> topics;               ///< name of each topic
+  std::vector<RosDefinition> definitions;        ///< of each source's messages: a reader may know its topics only later
+  std::vector<std::vector<std::string>> filled;  ///< of each source: BagTopicView::filled
+  BagClocks clocks;                              ///< of each source
 };
+
+/// Rotation about the vertical of a quaternion (x, y, z, w) that turns forward to where it points, rad; NaN of one that is
+/// none, as of a message whose orientation nobody set.
+double yaw_of(const double* q) {
+  if (q[0] == 0.0 && q[1] == 0.0 && q[2] == 0.0 && q[3] == 0.0) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  return std::atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), q[3] * q[3] + q[0] * q[0] - q[1] * q[1] - q[2] * q[2]);
+}
+
+/// Where messages of a type of poses have their orientation; empty for other types.
+std::string_view orientation_of(std::string_view type) {
+  return type == "geometry_msgs/msg/PoseStamped" ? "pose.orientation"
+         : type == "geometry_msgs/msg/PoseWithCovarianceStamped" || type == "nav_msgs/msg/Odometry"
+             ? "pose.pose.orientation"
+             : "";
+}
 
 /// Adds the names of a message and the arrays that have numbers in it.
 void look_at(const BagTopic& topic, std::string_view data, BagTopicView& view) {
@@ -59,20 +80,49 @@ void look_at(const BagTopic& topic, std::string_view data, BagTopicView& view) {
   if (!extractor.read(data, values)) {
     return;
   }
-  for (std::size_t k = 0; k < joint_arrays.size(); ++k) {
-    const auto first = values.begin() + static_cast<std::ptrdiff_t>(k * names.size());
-    const bool numbers = std::any_of(first, first + static_cast<std::ptrdiff_t>(names.size()),
-                                     [](double value) { return !std::isnan(value); });
-    if (numbers && std::ranges::find(view.filled, joint_arrays[k]) == view.filled.end()) {
-      view.filled.emplace_back(joint_arrays[k]);
+  const auto add = [](std::vector<std::string>& to, const std::string& what) {
+    if (std::ranges::find(to, what) == to.end()) {
+      to.push_back(what);
+    }
+  };
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (!std::isnan(values[k])) {
+      const char* const array = joint_arrays[k / names.size()];
+      add(view.filled, array);
+      add(view.elements, fmt::format("{}[{}]", array, names[k % names.size()]));
     }
   }
 }
 
+/// Adds what an Imu says it does not measure: the first element of a covariance is −1 (sensor_msgs/Imu).
+void look_at_imu(const BagTopic& topic, std::string_view data, BagTopicView& view) {
+  for (const std::string what : {"angular_velocity", "linear_acceleration"}) {
+    RosExtractor extractor(*topic.definition, {what + "_covariance[0]"});
+    std::array<double, 1> first{};
+    if (extractor.read(data, first) && first[0] == -1.0) {
+      view.unmeasured.push_back(what);
+    }
+  }
+}
+
+/// Adds that a pose has no orientation: its first quaternion is none.
+void look_at_pose(const BagTopic& topic, std::string_view data, BagTopicView& view) {
+  const std::string_view place = orientation_of(topic.type);
+  if (place.empty()) {
+    return;
+  }
+  RosExtractor extractor(*topic.definition, {fmt::format("{}.x", place), fmt::format("{}.y", place),
+                                             fmt::format("{}.z", place), fmt::format("{}.w", place)});
+  std::array<double, 4> q{};
+  if (extractor.read(data, q) && std::isnan(yaw_of(q.data()))) {
+    view.unmeasured.emplace_back("orientation");
+  }
+}
+
 /// The names and filled arrays of every topic that has them. The first messages are looked at one by one, since drivers
-/// begin with NaN and publishers share topics; later ones now and then, as long as an array is empty.
+/// begin with NaN and publishers share topics; later ones now and then.
 std::vector<BagTopicView> view_topics(BagReader& bag) {
-  constexpr std::size_t each = 50, then_every = 100;
+  constexpr std::size_t each = 50;
   std::map<std::size_t, BagTopicView> met;
   std::map<std::size_t, std::size_t> counts;
   BagMessage message;
@@ -82,9 +132,11 @@ std::vector<BagTopicView> view_topics(BagReader& bag) {
     const BagTopic& topic = bag.topics()[message.topic];
     BagTopicView& view = met[message.topic];
     const std::size_t count = counts[message.topic]++;
-    if (topic.type == "sensor_msgs/msg/JointState" && topic.definition &&
-        (count < each || (view.filled.size() < joint_arrays.size() && count % then_every == 0))) {
+    if (topic.type == joint_state && topic.definition && (count < each || count % then_every == 0)) {
       look_at(topic, message.data, view);
+    } else if (topic.definition && count == 0) {
+      topic.type == "sensor_msgs/msg/Imu" ? look_at_imu(topic, message.data, view)
+                                          : look_at_pose(topic, message.data, view);
     }
   }
   std::vector<BagTopicView> views;
@@ -120,11 +172,6 @@ std::vector<TopicTimes> first_times(BagReader& bag, const std::vector<BagSource>
   return times;
 }
 
-/// Rotation about the vertical of a quaternion (x, y, z, w) that turns forward to where it points, rad.
-double yaw_of(const double* q) {
-  return std::atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), q[3] * q[3] + q[0] * q[0] - q[1] * q[1] - q[2] * q[2]);
-}
-
 /// What `column` makes of its fields.
 double value_of(const BagColumn& column, const double* numbers) {
   if (column.is_yaw()) {
@@ -140,7 +187,8 @@ double value_of(const BagColumn& column, const double* numbers) {
 /// A message that waits for earlier ones that come late.
 struct Waiting {
   std::int64_t time = 0;
-  std::vector<double> values;
+  std::vector<double> numbers;  ///< as extracted
+  std::size_t message = 0;      ///< of the topic, counted from 1
 };
 
 /// What the walk reads from one topic.
@@ -152,20 +200,25 @@ struct Reading {
   std::optional<RosExtractor> extractor;
   std::vector<double> numbers;  ///< as extracted
   std::vector<double> values;   ///< one for each column
-  std::size_t messages = 0;     ///< of the topic so far
+  /// Of each number whether it is one, and which. A wrapped angle says nothing of a mean, or of what lies between two.
+  std::vector<std::optional<WheelAngle>> angles;
+  double longest_gap = 0.0;  ///< s, behind which the last step of an angle says nothing of the next
+  std::size_t messages = 0;  ///< of the topic so far
   std::size_t damaged = 0;
   std::size_t unstamped = 0;
   std::size_t without = 0;      ///< messages that have none of the columns
   std::size_t late = 0;         ///< messages that came after later ones
   std::deque<Waiting> waiting;  ///< by their times
   std::string first_damage;
+  std::vector<std::string> filled;     ///< arrays that were known to have numbers when columns were chosen
+  std::vector<std::string> late_fill;  ///< in words, those that had some later
 };
 
 class BagWalk final : public RowWalk {
  public:
   BagWalk(const BagPlan& plan, const std::vector<std::string>& names, double longest_step, LogReport* report,
           std::int64_t origin)
-      : plan_(plan), names_(names), cleaner_(names, report), row_(names.size() + 1), origin_(origin) {
+      : plan_(plan), names_(names), report_(report), cleaner_(names, report), row_(names.size() + 1), origin_(origin) {
     BagOptions options = plan.options;
     options.hashed = report != nullptr;
     bag_ = open_bag({plan.path}, options);
@@ -173,6 +226,9 @@ class BagWalk final : public RowWalk {
     std::vector<AlignedStream> streams;
     for (std::size_t k = 0; k < plan.choice.sources.size(); ++k) {
       add_reading(plan.choice.sources[k], plan.definitions[k], plan.clocks.clocks[k], streams);
+      if (!readings_.empty() && readings_.back().topic == plan.choice.sources[k].topic) {
+        readings_.back().filled = plan.filled[k];
+      }
     }
     if (readings_.empty()) {
       throw InputError(plan.path.string() + ": none of the wanted columns is in it");
@@ -223,6 +279,17 @@ class BagWalk final : public RowWalk {
     for (std::size_t k = 0; k < readings_.size(); ++k) {
       describe(readings_[k], k, file);
     }
+    for (std::size_t k = 0; k < plan_.topics.size(); ++k) {
+      const BagTopic& topic = bag_->topics()[k];
+      const bool read = std::ranges::find(readings_, k, &Reading::topic) != readings_.end();
+      if (!read && topic.messages > 0 && std::ranges::any_of(readings_, [&](const Reading& reading) {
+            return plan_.topics[reading.topic] == topic.name;
+          })) {
+        file.notes.push_back(fmt::format(
+            "{} messages of {} are of another type or definition, or otherwise encoded ({}, {}), and were not read",
+            topic.messages, topic.name, topic.type, topic.encoding));
+      }
+    }
     for (std::size_t k = plan_.topics.size(); k < bag_->topics().size(); ++k) {
       file.notes.push_back(fmt::format(
           "{} begins so late that it was not looked at for columns; begin the recording anew, or cut it, to use it",
@@ -246,7 +313,10 @@ class BagWalk final : public RowWalk {
       reading.columns.push_back(column);
       fields.insert(fields.end(), column.fields.begin(), column.fields.end());
       reading.slots.push_back(static_cast<std::size_t>(name - names_.begin()));
-      stream.angle.push_back(column.is_yaw());
+      stream.angle.push_back(column.name == "theta");
+      const bool wheel = column.name == "phi_r" || column.name == "phi_l";
+      reading.angles.insert(reading.angles.end(), column.fields.size(),
+                            wheel ? std::optional(WheelAngle()) : std::nullopt);
     }
     if (reading.columns.empty()) {
       return;
@@ -255,6 +325,7 @@ class BagWalk final : public RowWalk {
     stream.longest_gap = longest_gap_of(clock.median_step);
     stream.time_error = clock.jitter;
     reading.extractor.emplace(definition, fields);
+    reading.longest_gap = static_cast<double>(stream.longest_gap) / static_cast<double>(one_second);
     reading.numbers.resize(fields.size());
     reading.values.resize(reading.columns.size());
     readings_.push_back(std::move(reading));
@@ -278,6 +349,9 @@ class BagWalk final : public RowWalk {
     }
     Reading& reading = *found;
     ++reading.messages;
+    if (report_ != nullptr && reading.messages % then_every == 0) {
+      look_again(reading, message);
+    }
     if (!reading.extractor->read(message.data, reading.numbers)) {
       damage(reading, reading.extractor->error());
       return;
@@ -296,11 +370,7 @@ class BagWalk final : public RowWalk {
       damage(reading, "its time is more than 146 years away");
       return;
     }
-    const double* number = reading.numbers.data();
-    for (std::size_t k = 0; k < reading.columns.size(); ++k) {
-      reading.values[k] = value_of(reading.columns[k], number);
-      number += reading.columns[k].fields.size();
-    }
+    find_values(reading);
     if (std::ranges::all_of(reading.values, [](double value) { return std::isnan(value); })) {
       ++reading.without;
       return;
@@ -308,9 +378,61 @@ class BagWalk final : public RowWalk {
     put_in_order(static_cast<std::size_t>(found - readings_.begin()), time + reading.clock.shift);
   }
 
+  /// Whether an array has numbers now that had none when columns were chosen.
+  void look_again(Reading& reading, const BagMessage& message) {
+    const BagTopic& topic = bag_->topics()[message.topic];
+    if (topic.type != joint_state || !topic.definition || reading.filled.size() == joint_arrays.size()) {
+      return;
+    }
+    BagTopicView now;
+    look_at(topic, message.data, now);
+    for (const std::string& array : now.filled) {
+      if (std::ranges::find(reading.filled, array) == reading.filled.end()) {
+        reading.filled.push_back(array);
+        const auto element = std::ranges::find_if(now.elements, [&](const auto& e) { return e.starts_with(array); });
+        reading.late_fill.push_back(
+            fmt::format("{}: {} has numbers from about message {} on, too late to be looked at for columns: --map "
+                        "NAME={}.{} takes them",
+                        topic.name, array, reading.messages, topic.name, *element));
+      }
+    }
+  }
+
   static void damage(Reading& reading, const std::string& why) {
     if (reading.damaged++ == 0) {
       reading.first_damage = fmt::format("message {}: {}", reading.messages, why);
+    }
+  }
+
+  /// What the columns make of the numbers.
+  static void find_values(Reading& reading) {
+    const double* number = reading.numbers.data();
+    for (std::size_t k = 0; k < reading.columns.size(); ++k) {
+      reading.values[k] = value_of(reading.columns[k], number);
+      number += reading.columns[k].fields.size();
+    }
+  }
+
+  /// Undoes the whole turns of wheel angles, joint by joint.
+  void unwrap(Reading& reading, const Waiting& message) {
+    const double time = static_cast<double>(message.time) / static_cast<double>(one_second);
+    std::size_t at = 0;
+    for (const BagColumn& column : reading.columns) {
+      for (const std::string& field : column.fields) {
+        double& number = reading.numbers[at];
+        std::optional<WheelAngle>& angle = reading.angles[at++];
+        if (!angle || !std::isfinite(number) || column.factor == 0.0 || time == angle->time()) {
+          continue;
+        }
+        const double step = time - angle->time();
+        const double value = number * column.factor;
+        number = (step > 0.0 ? angle->follow(time, value, step <= reading.longest_gap) : angle->begin(time, value)) /
+                 column.factor;
+        if (angle->jumped() && report_ != nullptr && report_->angle_wraps.count++ == 0) {
+          report_->angle_wraps.first = fmt::format("{}: {}, message {}, {} for column {}", plan_.path.string(),
+                                                   plan_.topics[reading.topic], message.message, field, column.name);
+        }
+      }
     }
   }
 
@@ -324,14 +446,18 @@ class BagWalk final : public RowWalk {
     }
     const auto later = std::ranges::upper_bound(waiting, time, {}, [](const Waiting& message) { return message.time; });
     reading.late += later != waiting.end() ? 1U : 0U;
-    waiting.insert(later, {time, reading.values});
+    waiting.insert(later, {time, reading.numbers, reading.messages});
     release(k, waiting.back().time - longest_late);
   }
 
   void release(std::size_t k, std::int64_t until) {
-    std::deque<Waiting>& waiting = readings_[k].waiting;
+    Reading& reading = readings_[k];
+    std::deque<Waiting>& waiting = reading.waiting;
     while (!waiting.empty() && waiting.front().time <= until) {
-      aligner_->push(k, waiting.front().time, waiting.front().values);
+      reading.numbers = waiting.front().numbers;
+      unwrap(reading, waiting.front());
+      find_values(reading);
+      aligner_->push(k, waiting.front().time, reading.values);
       waiting.pop_front();
     }
   }
@@ -366,6 +492,7 @@ class BagWalk final : public RowWalk {
       file.notes.push_back(fmt::format("{} of {} messages of {} could not be read and were left out (first: {})",
                                        reading.damaged, reading.messages, topic, reading.first_damage));
     }
+    file.notes.insert(file.notes.end(), reading.late_fill.begin(), reading.late_fill.end());
     if (reading.unstamped > 0) {
       file.notes.push_back(
           fmt::format("{} of {} messages of {} have no time stamp, unlike the others, and were left out",
@@ -397,6 +524,7 @@ class BagWalk final : public RowWalk {
 
   const BagPlan& plan_;
   const std::vector<std::string>& names_;
+  LogReport* report_;
   RowCleaner cleaner_;
   std::vector<double> row_;  ///< time, then the columns
   std::int64_t origin_;
@@ -415,6 +543,7 @@ class BagFile final : public RowFile {
               .choice = {},
               .topics = {},
               .definitions = {},
+              .filled = {},
               .clocks = {}},
         origin_(std::move(origin)) {
     const auto bag = open_bag({path}, plan_.options);
@@ -428,6 +557,7 @@ class BagFile final : public RowFile {
     }
     for (const BagSource& source : plan_.choice.sources) {
       plan_.definitions.push_back(*bag->topics()[source.topic].definition);
+      plan_.filled.push_back(views[source.topic].filled);
     }
     const std::vector<TopicTimes> times = first_times(*bag, plan_.choice.sources);
     plan_.clocks = bag_clocks(times);

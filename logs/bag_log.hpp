@@ -84,6 +84,11 @@ struct BagTopicView {
   bool silent = false;  ///< has no messages: nothing is taken from it unasked
   std::vector<std::string> names;
   std::vector<std::string> filled;  ///< arrays beside `names` that had numbers in one of these messages
+  /// "effort[left]" and the like that had one; where this is empty any element of a filled array counts as having one
+  std::vector<std::string> elements = {};
+  /// What the first message says is not measured: "angular_velocity", "linear_acceleration" of an Imu, "orientation" of a
+  /// pose.
+  std::vector<std::string> unmeasured = {};
 };
 
 /// Chooses columns. What `options.map` says goes first: NAME=TOPIC.PATH, e.g.
@@ -92,10 +97,13 @@ struct BagTopicView {
 /// - sensor_msgs/JointState: the joints that are named right and left (of those named wheel, where there are any; no
 ///   casters) give phi, omega and tau; of several wheels a side the mean of the motion and the sum of the efforts; a
 ///   topic with one joint gives position, velocity and effort, too, and its own name may tell the side; where others
-///   give columns of right and left wheels, and none is asked for by name, those of an axis are left out and reported;
+///   give columns of right and left wheels, and none is asked for by name, those of an axis are left out and reported,
+///   as are joints named neither wheel, motor nor drive; a side of more wheels than the other is left out where a wheel
+///   has no side by its name;
 /// - geometry_msgs/PoseStamped and PoseWithCovarianceStamped, else nav_msgs/Odometry, give x, y and theta; an Odometry
 ///   topic whose name says that it comes from the wheels is left out, since that is no independent measurement;
-/// - sensor_msgs/Imu gives gyro_z and accel_x;
+/// - a topic of joints or poses whose name says that they are wished for (goal, target, command) is left out;
+/// - sensor_msgs/Imu gives gyro_z and accel_x, but for what it says it does not measure;
 /// - types of other packages than ROS's own give the columns that fields of theirs are named after.
 /// Where two topics could give a column it is left out and reported. The rows' times are those of the topic with the
 /// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -99,17 +100,156 @@ std::size_t demand_field(const std::vector<std::string>& fields, const std::stri
                                core::listed(fields), files::did_you_mean(name, fields)));
 }
 
+/// A unit that tables are written in, in small letters and without blanks and points, and what makes `own` of it.
+struct ForeignUnit {
+  std::string_view written, own;
+  double factor;
+};
+
+constexpr double per_rpm = std::numbers::pi / 30.0, per_degree = std::numbers::pi / 180.0,
+                 per_turn = 2.0 * std::numbers::pi;
+constexpr ForeignUnit foreign_units[] = {
+    {"rpm", "rad/s", per_rpm},
+    {"rev/min", "rad/s", per_rpm},
+    {"1/min", "rad/s", per_rpm},
+    {"rps", "rad/s", per_turn},
+    {"rev/s", "rad/s", per_turn},
+    {"turns/s", "rad/s", per_turn},
+    {"dps", "rad/s", per_degree},
+    {"deg/s", "rad/s", per_degree},
+    {"°/s", "rad/s", per_degree},
+    {"mrad/s", "rad/s", 1e-3},
+    {"deg", "rad", per_degree},
+    {"degrees", "rad", per_degree},
+    {"°", "rad", per_degree},
+    {"rev", "rad", per_turn},
+    {"turns", "rad", per_turn},
+    {"mrad", "rad", 1e-3},
+    {"ma", "A", 1e-3},
+    {"mv", "V", 1e-3},
+    {"mnm", "N·m", 1e-3},
+    {"nmm", "N·m", 1e-3},
+    {"ncm", "N·m", 1e-2},
+    {"mm", "m", 1e-3},
+    {"cm", "m", 1e-2},
+    {"km", "m", 1e3},
+    {"ms", "s", 1e-3},
+    {"us", "s", 1e-6},
+    {"µs", "s", 1e-6},
+    {"μs", "s", 1e-6},
+    {"ns", "s", 1e-9},
+    {"min", "s", 60.0},
+    {"g", "m/s²", 9.80665},
+    {"mm/s", "m/s", 1e-3},
+    {"km/h", "m/s", 1.0 / 3.6},
+};
+
+/// The entry for what is `written` of a column whose units are `own` ("m or rad"); nullptr where there is none.
+const ForeignUnit* find_foreign_unit(std::string_view written, std::string_view own) {
+  std::string plain;
+  for (const char c : written) {
+    if (std::string_view(" *.^").find(c) == std::string_view::npos) {
+      plain += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+  }
+  if (const std::size_t dot = plain.find("·"); dot != std::string::npos) {
+    plain.erase(dot, std::string_view("·").size());
+  }
+  const std::string list = fmt::format(" {} ", own);
+  const auto found = std::ranges::find_if(foreign_units, [&](const ForeignUnit& unit) {
+    return unit.written == plain && list.find(fmt::format(" {} ", unit.own)) != std::string::npos;
+  });
+  return found == std::end(foreign_units) ? nullptr : found;
+}
+
+/// A field cut into a name and a unit.
+struct NameWithUnit {
+  std::string_view name, unit;
+  bool marked = true;     ///< by brackets or " / ": whatever stands there is meant as a unit
+  bool own_taken = true;  ///< whether the contract's own unit may stand so
+};
+
+/// The ways to cut "omega_r [rpm]" (in brackets of any kind), "omega_r / rpm", "omega_r/rpm" and "omega_r_rpm".
+std::vector<NameWithUnit> cut_units(std::string_view field) {
+  constexpr std::string_view opening = "[({<", closing = "])}>";
+  std::vector<NameWithUnit> cuts;
+  const auto cut = [&](std::size_t at, std::size_t length, std::size_t behind, bool marked, bool own_taken) {
+    if (at != std::string_view::npos && at > 0 && at + length + behind < field.size()) {
+      const std::string_view unit = field.substr(at + length, field.size() - at - length - behind);
+      cuts.push_back({trimmed_field(field.substr(0, at)), trimmed_field(unit), marked, own_taken});
+    }
+  };
+  const std::size_t kind = field.empty() ? std::string_view::npos : closing.find(field.back());
+  if (kind != std::string_view::npos) {
+    cut(field.rfind(opening[kind]), 1, 1, true, true);
+  }
+  cut(field.find(" / "), 3, 0, true, true);
+  cut(field.find('/'), 1, 0, false, true);
+  cut(field.rfind('_'), 1, 0, false, false);
+  return cuts;
+}
+
+/// recognise_log_column(), with units behind a slash and in any brackets.
+const LogColumn* column_of_field(const std::string& field) {
+  if (const LogColumn* column = recognise_log_column(field)) {
+    return column;
+  }
+  for (const NameWithUnit& cut : cut_units(field)) {
+    const LogColumn* column =
+        cut.own_taken ? recognise_log_column(fmt::format("{} [{}]", cut.name, cut.unit)) : nullptr;
+    if (column != nullptr) {
+      return column;
+    }
+  }
+  return nullptr;
+}
+
+bool is_wanted(const CsvOptions& options, const std::string& name) {
+  return name == "t" || !options.only || std::ranges::find(*options.only, name) != options.only->end();
+}
+
+/// Why `field` is not taken for the column that it is called like: a unit of its own. Nothing where that is not so, or
+/// the column is not `missing`.
+template <typename Missing>
+std::string unit_note(const std::string& field, const Missing& missing) {
+  for (const auto& [name, unit, marked, own_taken] : cut_units(field)) {
+    const LogColumn* column = recognise_log_column(name);
+    if (column == nullptr || unit.empty() || files::to_number(unit) || !missing(column->name)) {
+      continue;
+    }
+    const ForeignUnit* known = find_foreign_unit(unit, column->unit);
+    if (known != nullptr || marked) {
+      return fmt::format("{} was not taken as {}: its unit is '{}', expected {}; {}", files::one_line(field),
+                         column->name, files::one_line(unit), column->unit,
+                         known != nullptr ? map_argument(column->name, field, known->factor)
+                                          : fmt::format("--map {}=\"{}*FACTOR\"", column->name, field));
+    }
+  }
+  return {};
+}
+
+/// Says of each field that is left and called like a column that is missing why it was not taken.
+void note_units(CsvHeader& header, const CsvOptions& options) {
+  for (std::size_t k = 0; k < header.fields.size(); ++k) {
+    if (std::ranges::any_of(header.found, [&](const auto& found) { return found.second == k; })) {
+      continue;
+    }
+    std::string note = unit_note(header.fields[k], [&](const std::string& name) {
+      return !header.found.contains(name) && is_wanted(options, name);
+    });
+    if (!note.empty()) {
+      header.notes.push_back(std::move(note));
+    }
+  }
+}
+
 void recognise(CsvHeader& header, const CsvOptions& options, const std::string& place) {
   std::map<std::string, std::vector<std::size_t>> candidates;
   for (std::size_t k = 0; k < header.fields.size(); ++k) {
     const bool taken =
         std::any_of(header.found.begin(), header.found.end(), [&](const auto& f) { return f.second == k; });
-    const LogColumn* column = recognise_log_column(header.fields[k]);
-    if (taken || column == nullptr || header.found.contains(column->name)) {
-      continue;
-    }
-    if (column->name != "t" && options.only &&
-        std::find(options.only->begin(), options.only->end(), column->name) == options.only->end()) {
+    const LogColumn* column = column_of_field(header.fields[k]);
+    if (taken || column == nullptr || header.found.contains(column->name) || !is_wanted(options, column->name)) {
       continue;
     }
     candidates[column->name].push_back(k);
@@ -187,12 +327,33 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
     }
   }
   recognise(header, options, place);
+  note_units(header, options);
   if (!header.found.contains("t")) {
-    throw InputError(fmt::format("{}: no column for t (time, s): expected one of {}{}; see --map t=COLUMN{}", place,
-                                 core::listed(header.fields), files::did_you_mean("time", header.fields),
+    std::string units;
+    for (const std::string& note : header.notes) {
+      units += "; " + note;
+    }
+    throw InputError(fmt::format("{}: no column for t (time, s): expected one of {}{}; see --map t=COLUMN{}{}", place,
+                                 core::listed(header.fields), files::did_you_mean("time", header.fields), units,
                                  known_logger(header.fields)));
   }
   return header;
+}
+
+std::string map_argument(std::string_view name, std::string_view field, double factor) {
+  return fmt::format("--map {}=\"{}*{:g}\"", name, field, factor);
+}
+
+void HeadingUnit::add(double theta) {
+  constexpr double nearly = 300.0;
+  jumps_ = jumps_ || (std::abs(theta - before_) > nearly && std::abs(theta - before_) <= 360.0);
+  least_ = std::min(least_, theta);
+  most_ = std::max(most_, theta);
+  before_ = std::isnan(theta) ? before_ : theta;
+}
+
+bool HeadingUnit::degrees() const {
+  return jumps_ && ((least_ >= -180.0 && most_ <= 180.0) || (least_ >= 0.0 && most_ <= 360.0));
 }
 
 bool is_csv_content(std::string_view line) {
@@ -224,6 +385,7 @@ void CsvRowReader::begin_file(const CsvHeader& header, std::string path) {
   fields_ = header.fields;
   separator_ = header.separator;
   clock_ = {};
+  heading_ = {};
   slots_.assign(fields_.size(), -1);
   const auto take = [&](const std::string& name, int slot) {
     const auto found = header.found.find(name);
@@ -243,6 +405,7 @@ void CsvRowReader::begin_file(const CsvHeader& header, std::string path) {
   take("t", 0);
   for (std::size_t c = 0; c < names_.size(); ++c) {
     take(names_[c], static_cast<int>(c) + 1);
+    theta_ = names_[c] == "theta" ? c + 1 : theta_;
   }
   for (const auto& [name, factor] : header.factors) {
     const auto at = std::ranges::find(names_, name);
@@ -315,10 +478,11 @@ void CsvRowReader::convert_time(std::string_view text) {
     clock_.known = true;
     if (whole && t > limits_[0]) {
       constexpr double a_year = 3.2e7;  // s: later than 1971, whichever unit
-      for (const auto& [seconds, unit] : {std::pair{1e-9, "ns"}, {1e-6, "µs"}, {1e-3, "ms"}}) {
-        if (t * seconds > a_year && t * seconds < 1e3 * a_year) {
+      const auto assumed = clock_.assumed;
+      for (const auto& [seconds, unit] : count_units) {
+        if (assumed ? assumed->name == unit : t * seconds > a_year && t * seconds < 1e3 * a_year) {
           const auto second = static_cast<std::int64_t>(std::round(1.0 / seconds));
-          clock_ = {true, seconds, unit, count / second * second};
+          clock_ = {true, seconds, unit, count / second * second, assumed};
           break;
         }
       }
@@ -410,6 +574,9 @@ bool CsvRowReader::read_numbers(std::string_view line, std::size_t line_number, 
   }
   for (const auto& [index, factor] : factors_) {
     values_[index] *= factor;
+  }
+  if (theta_ != 0) {
+    heading_.add(values_[theta_]);
   }
   return true;
 }

@@ -3,8 +3,10 @@
 /// The CSV format: header line (separator, columns) and rows.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -44,7 +46,31 @@ struct CsvHeader {
   std::vector<std::string> fields;           ///< the columns as written, quotes and surrounding blanks removed
   std::map<std::string, std::size_t> found;  ///< wanted name (`t` among them) -> field
   std::map<std::string, double> factors;     ///< wanted name -> FACTOR of its field, where it has one
+  std::vector<std::string> notes;            ///< fields called like a column and not taken for their unit, and why
 };
+
+/// A unit in which clocks count.
+struct CountUnit {
+  double seconds = 1.0;
+  std::string_view name;
+};
+inline constexpr std::array<CountUnit, 3> count_units = {{{1e-9, "ns"}, {1e-6, "µs"}, {1e-3, "ms"}}};
+
+/// Tells a heading in degrees from one in radians, in which an angle never jumps by nearly 360.
+class HeadingUnit {
+ public:
+  void add(double theta);
+  /// True where all values lie in [-180, 180] or [0, 360] with jumps from one end to the other.
+  [[nodiscard]] bool degrees() const;
+
+ private:
+  double before_ = std::numeric_limits<double>::quiet_NaN();
+  double least_ = std::numeric_limits<double>::infinity(), most_ = -least_;
+  bool jumps_ = false;
+};
+
+/// `--map NAME="FIELD*FACTOR"`, as an argument of the program.
+[[nodiscard]] std::string map_argument(std::string_view name, std::string_view field, double factor);
 
 /// COLUMN and FACTOR of COLUMN*FACTOR; the whole and 1 where it is none.
 [[nodiscard]] std::pair<std::string, double> split_factor(const std::string& text);
@@ -73,6 +99,12 @@ class CsvRowReader {
   [[nodiscard]] std::string_view clock_unit() const { return clock_.unit; }
   /// What such times are counted from, s.
   [[nodiscard]] double clock_origin() const { return static_cast<double>(clock_.origin) * clock_.seconds; }
+
+  /// Takes times of the file just begun that lie beyond LogColumn::limit for counts of `unit`, whatever their size.
+  void assume_counts(const CountUnit& unit) { clock_.assumed = unit; }
+
+  /// What the headings met tell of their unit.
+  [[nodiscard]] const HeadingUnit& heading() const { return heading_; }
 
   /// Steps longer than `seconds` are gaps.
   void set_longest_step(double seconds) { cleaner_.set_longest_step(seconds); }
@@ -112,6 +144,7 @@ class CsvRowReader {
     double seconds = 1.0;
     std::string_view unit;
     std::int64_t origin = 0;
+    std::optional<CountUnit> assumed;
   };
   void convert_time(std::string_view text);
 
@@ -126,6 +159,8 @@ class CsvRowReader {
   std::string path_;
   std::vector<std::string> fields_;
   Clock clock_;
+  HeadingUnit heading_;
+  std::size_t theta_ = 0;   ///< index of the heading in values_, 0 where there is none
   std::vector<int> slots_;  ///< field -> index in values_, or −1
   char separator_ = ',';
   std::vector<double> values_;                           ///< time, then the columns

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -37,17 +39,50 @@ constexpr hsize_t most_rows = hsize_t{1} << 32;
 constexpr hsize_t largest_chunk = hsize_t{1} << 25;  // bytes; the library holds a chunk of each column
 constexpr hsize_t cached_chunks = hsize_t{1} << 20;  // bytes that the library keeps unasked
 constexpr std::uint64_t always_pieces = std::uint64_t{1} << 16, bytes_a_piece = 8;
+constexpr hsize_t most_attributes = 1000;  // of a dataset, each of which has to be looked at
+constexpr hssize_t most_attribute_values = 64;
+constexpr std::size_t longest_attribute_text = 4096;
+
+/// Where the values of a dataset stand: in a line along one of at most two dimensions, of which the other has a size of
+/// 1, as MATLAB and column vectors have it.
+struct ValueLine {
+  using Place = std::array<hsize_t, 2>;
+
+  hsize_t rows = 0;
+  int dimensions = 1;
+  std::size_t along = 0;
+
+  [[nodiscard]] Place place(hsize_t row) const { return along == 0 ? Place{row, 0} : Place{0, row}; }
+  [[nodiscard]] Place sides(hsize_t count) const { return along == 0 ? Place{count, 1} : Place{1, count}; }
+};
+
+/// What stored numbers mean by the attributes of netCDF's conventions (CF).
+struct StoredAs {
+  double scale = 1.0, offset = 0.0;
+  std::vector<double> missing{};  ///< stored numbers that stand for none
+
+  [[nodiscard]] bool plain() const { return scale == 1.0 && offset == 0.0 && missing.empty(); }
+  [[nodiscard]] double value(double stored) const {
+    if (std::ranges::find(missing, stored) != missing.end()) {
+      return std::numeric_limits<double>::quiet_NaN();
+    }
+    return offset == 0.0 ? scale * stored : scale * stored + offset;  // + 0 would take the sign of -0
+  }
+};
 
 /// One column that a file has: a dataset, or a member of one of a compound type.
 struct Source {
-  std::string path;    ///< of the dataset
-  std::string member;  ///< empty for a plain dataset
-  std::string unit;
-  hsize_t rows = 0;
-  hsize_t chunk = 0;      ///< bytes of one, 0 where it is not stored in chunks
-  std::string refused{};  ///< why it is not read, without a subject; empty where it is
-  std::string unlike{};   ///< how it differs from a column, in spite of its name
-  double factor = 1.0;    ///< by which its values are multiplied
+  std::string path{};    ///< of the dataset
+  std::string member{};  ///< empty for a plain dataset
+  std::string unit{};
+  ValueLine line{};
+  hsize_t chunk = 0;       ///< bytes of one, 0 where it is not stored in chunks
+  std::string refused{};   ///< why it is not read, without a subject; empty where it is
+  std::string unlike{};    ///< how it differs from a column, in spite of its name
+  std::string doubtful{};  ///< why it is read only where it is asked for by name
+  std::string remedy{};    ///< what makes a column of what is unlike one
+  StoredAs stored{};
+  double factor = 1.0;  ///< by which its values are multiplied
 
   [[nodiscard]] std::string name() const { return member.empty() ? path.substr(path.rfind('/') + 1) : member; }
   [[nodiscard]] std::string shown() const { return member.empty() ? path : path + "." + member; }
@@ -99,43 +134,150 @@ std::string format_defect(hid_t type) {
                      bits);
 }
 
-/// The text of attribute `units` or `unit`; empty where there is none. Nothing where the attributes are damaged: the
-/// library must not be asked about them again, since it then reads what it has freed.
-std::optional<std::string> unit_of(hid_t dataset) {
-  for (const char* name : {"units", "unit"}) {
-    const htri_t exists = H5Aexists(dataset, name);
-    if (exists < 0) {
+/// One attribute, opened.
+struct OpenAttribute {
+  hid_t id, type;
+  hssize_t count;  ///< of its values
+};
+
+/// The text of an attribute, of which all strings are equal, without blanks at its ends; nothing where it is none.
+std::optional<std::string> text_of(const OpenAttribute& attribute) {
+  if (H5Tget_class(attribute.type) != H5T_STRING || attribute.count > most_attribute_values) {
+    return std::nullopt;
+  }
+  const auto count = static_cast<std::size_t>(attribute.count);
+  std::vector<std::string> texts(std::max<std::size_t>(count, 1));
+  const std::size_t size = H5Tget_size(attribute.type);
+  if (H5Tis_variable_str(attribute.type) > 0) {
+    std::vector<char*> read(texts.size(), nullptr);
+    if (count > 0 && H5Aread(attribute.id, attribute.type, static_cast<void*>(read.data())) < 0) {
       return std::nullopt;
     }
-    if (exists == 0) {
-      continue;
+    for (std::size_t k = 0; k < count; ++k) {
+      texts[k] = read[k] == nullptr ? "" : read[k];
+      H5free_memory(read[k]);
     }
-    const Handle attribute(H5Aopen(dataset, name, H5P_DEFAULT), H5Aclose);
-    const Handle type(attribute ? H5Aget_type(attribute.get()) : -1, H5Tclose);
-    const Handle space(attribute ? H5Aget_space(attribute.get()) : -1, H5Sclose);
-    if (!type || !space) {
+  } else {
+    std::string read(size <= longest_attribute_text ? size * texts.size() : 0, '\0');
+    if (read.empty() || (count > 0 && H5Aread(attribute.id, attribute.type, read.data()) < 0)) {
       return std::nullopt;
     }
-    if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) < 0 ||
-        H5Sget_simple_extent_npoints(space.get()) != 1) {
-      continue;
-    }
-    if (H5Tis_variable_str(type.get()) > 0) {
-      char* text = nullptr;
-      if (H5Aread(attribute.get(), type.get(), static_cast<void*>(&text)) < 0 || text == nullptr) {
-        continue;
-      }
-      const std::string unit(text);
-      H5free_memory(text);
-      return unit;
-    }
-    const std::size_t size = H5Tget_size(type.get());
-    std::string unit(std::min<std::size_t>(size, 4096), '\0');
-    if (size <= unit.size() && H5Aread(attribute.get(), type.get(), unit.data()) >= 0) {
-      return unit.substr(0, std::min(unit.find('\0'), unit.size()));
+    for (std::size_t k = 0; k < count; ++k) {
+      texts[k] = read.substr(k * size, size);
+      texts[k] = texts[k].substr(0, texts[k].find('\0'));
     }
   }
-  return "";
+  if (std::ranges::count(texts, texts.front()) != std::ssize(texts)) {
+    return std::nullopt;
+  }
+  const std::size_t begin = texts.front().find_first_not_of(" \t\r\n"), end = texts.front().find_last_not_of(" \t\r\n");
+  return begin == std::string::npos ? "" : texts.front().substr(begin, end - begin + 1);
+}
+
+/// The numbers of an attribute; none where it holds something else, or too many.
+std::vector<double> numbers_of(const OpenAttribute& attribute) {
+  const H5T_class_t kind = H5Tget_class(attribute.type);
+  if ((kind != H5T_INTEGER && kind != H5T_FLOAT) || attribute.count > most_attribute_values ||
+      !format_defect(attribute.type).empty()) {
+    return {};
+  }
+  std::vector<double> numbers(static_cast<std::size_t>(attribute.count));
+  const bool read = numbers.empty() || H5Aread(attribute.id, H5T_NATIVE_DOUBLE, numbers.data()) >= 0;
+  return read ? numbers : std::vector<double>{};
+}
+
+/// What an attribute holds, for a message.
+std::string attribute_shown(const OpenAttribute& attribute) {
+  std::vector<std::string> words;
+  for (const double number : numbers_of(attribute)) {
+    words.push_back(fmt::format("{:g}", number));
+  }
+  if (!words.empty()) {
+    return core::listed(words);
+  }
+  const std::optional<std::string> text = text_of(attribute);
+  return text ? files::shown(*text) : fmt::format("of {} values of another kind", attribute.count);
+}
+
+/// What the attributes of a dataset say.
+struct DatasetAttributes {
+  std::string unit{};
+  bool clear_unit = true;  ///< false where there are several, or something else than a text
+  StoredAs stored{};
+  std::string defect{};  ///< why the values cannot be told by them
+
+  void add(const std::string& name, const OpenAttribute& attribute, hid_t values) {
+    const std::string plain = plain_name(name);
+    if (plain == "units" || plain == "unit") {
+      const std::optional<std::string> text = text_of(attribute);
+      clear_unit = clear_unit && text && (unit.empty() || text->empty() || unit == *text);
+      unit = unit.empty() ? text.value_or("") : unit;
+      return;
+    }
+    const std::vector<double> numbers = numbers_of(attribute);
+    const bool scaling = plain == "scale_factor" || plain == "add_offset";
+    if (numbers.empty() || (scaling && (numbers.size() > 1 || !std::isfinite(numbers.front())))) {
+      defect = fmt::format("has attribute {} {}: expected {}", files::shown(name), attribute_shown(attribute),
+                           scaling ? "one finite number" : "numbers");
+    } else if (scaling) {
+      (plain == "scale_factor" ? stored.scale : stored.offset) = numbers.front();
+    } else {
+      for (const double number : numbers) {
+        stored.missing.push_back(as_stored(number, values));
+      }
+    }
+  }
+
+ private:
+  /// A float that is stored in fewer bits differs from a number of an attribute that has more.
+  static double as_stored(double number, hid_t values) {
+    std::array<double, 4> room{number};
+    if (H5Tget_class(values) == H5T_FLOAT && H5Tget_size(values) <= sizeof(room) && format_defect(values).empty()) {
+      H5Tconvert(H5T_NATIVE_DOUBLE, values, 1, room.data(), nullptr, H5P_DEFAULT);
+      H5Tconvert(values, H5T_NATIVE_DOUBLE, 1, room.data(), nullptr, H5P_DEFAULT);
+    }
+    return room.front();
+  }
+};
+
+/// What the attributes of a dataset say of its `values`. Nothing where they are damaged: the library must not be asked
+/// about them again, since it then reads what it has freed. Nor may it go through damaged ones, since it then gives back
+/// what it does not have: looking for a name that none can have meets the damage first, and in the library's own order it
+/// makes no table of those that stand outside of the header.
+std::optional<DatasetAttributes> attributes_of(hid_t dataset, hid_t values) {
+  static const std::string longer_than_any(std::size_t{1} << 16, 'x');
+  DatasetAttributes all;
+  H5O_info_t info{};
+  if (H5Aexists(dataset, longer_than_any.c_str()) < 0 || H5Oget_info2(dataset, &info, H5O_INFO_NUM_ATTRS) < 0) {
+    return std::nullopt;
+  }
+  if (info.num_attrs > most_attributes) {
+    all.defect = fmt::format("has {} attributes: expected at most {}", info.num_attrs, most_attributes);
+    return all;
+  }
+  std::vector<std::string> names;
+  const auto visit = [](hid_t, const char* name, const H5A_info_t*, void* to) -> herr_t {
+    constexpr std::array<std::string_view, 6> known{"units",      "unit",      "scale_factor",
+                                                    "add_offset", "fillvalue", "missing_value"};
+    if (std::ranges::find(known, plain_name(name)) != known.end()) {
+      static_cast<std::vector<std::string>*>(to)->emplace_back(name);
+    }
+    return 0;
+  };
+  if (H5Aiterate2(dataset, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, visit, &names) < 0) {
+    return std::nullopt;
+  }
+  for (const std::string& name : names) {
+    const Handle attribute(H5Aopen(dataset, name.c_str(), H5P_DEFAULT), H5Aclose);
+    const Handle type(attribute ? H5Aget_type(attribute.get()) : -1, H5Tclose);
+    const Handle space(attribute ? H5Aget_space(attribute.get()) : -1, H5Sclose);
+    const hssize_t count = space ? H5Sget_simple_extent_npoints(space.get()) : -1;
+    if (!type || count < 0) {
+      return std::nullopt;
+    }
+    all.add(name, {attribute.get(), type.get(), count}, values);
+  }
+  return all;
 }
 
 /// Bytes of the file.
@@ -157,9 +299,24 @@ std::string shuffle_defect(hid_t how, std::size_t width) {
              : "";
 }
 
+/// Sides of a chunk: along the line of values, and across it.
+struct PieceSides {
+  hsize_t along = 0, across = 1;
+};
+
+/// Those of a dataset in chunks; without length where they have other dimensions than the dataset, or no size.
+PieceSides piece_of(hid_t how, const ValueLine& line) {
+  ValueLine::Place sides{0, 1};
+  if (H5Pget_chunk(how, line.dimensions, sides.data()) != line.dimensions || sides[1 - line.along] == 0) {
+    return {};
+  }
+  return {sides[line.along], sides[1 - line.along]};
+}
+
 /// Why a dataset is not read: what it says of its place is followed with trust only, and its size must be one that a
 /// log has. `chunk` becomes the bytes of a chunk.
-std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t& chunk) {
+std::string refusal(hid_t dataset, hid_t type, const ValueLine& line, bool trust, hsize_t& chunk) {
+  const hsize_t rows = line.rows;
   const Handle how(H5Dget_create_plist(dataset), H5Pclose);
   const H5D_layout_t layout = how ? H5Pget_layout(how.get()) : H5D_LAYOUT_ERROR;
   if (!how || layout == H5D_LAYOUT_ERROR) {
@@ -178,11 +335,12 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t
   if (std::string defect = shuffle_defect(how.get(), width); !defect.empty()) {
     return defect;
   }
-  hsize_t piece = 0;
-  if (layout == H5D_CHUNKED && (H5Pget_chunk(how.get(), 1, &piece) != 1 || piece > largest_chunk / width)) {
-    return fmt::format("is stored in pieces of {} values: expected at most {} bytes in one", piece, largest_chunk);
+  const auto [piece, beside] = layout == H5D_CHUNKED ? piece_of(how.get(), line) : PieceSides{0, 1};
+  if (layout == H5D_CHUNKED && (piece == 0 || piece > largest_chunk / width / beside)) {
+    return fmt::format("is stored in pieces of {}{} values: expected at most {} bytes in one", piece,
+                       beside == 1 ? "" : fmt::format(" x {}", beside), largest_chunk);
   }
-  chunk = piece * width;
+  chunk = piece * beside * width;
   const Handle file(H5Iget_file_id(dataset), H5Fclose);
   if (!trust && piece > 0 && rows / piece > always_pieces + size_of(file.get()) / bytes_a_piece) {
     return fmt::format(
@@ -206,78 +364,132 @@ std::string refusal(hid_t dataset, hid_t type, hsize_t rows, bool trust, hsize_t
 }
 
 /// The first row of a dataset in chunks whose chunk the library finds no way to in the file, as it looks for it when it
-/// reads: it takes zeros in its place. Nothing where it finds all.
-std::optional<hsize_t> first_unwritten(hid_t dataset, hsize_t rows) {
+/// reads: it takes zeros in its place. Where chunks of `chunk` bytes are not packed and have fewer, it reads on behind
+/// them. Nothing where it finds all.
+std::optional<hsize_t> first_unwritten(hid_t dataset, const ValueLine& line, hsize_t chunk) {
   const Handle how(H5Dget_create_plist(dataset), H5Pclose);
-  hsize_t piece = 0;
-  if (H5Pget_layout(how.get()) != H5D_CHUNKED || H5Pget_chunk(how.get(), 1, &piece) != 1) {
+  const hsize_t piece = H5Pget_layout(how.get()) == H5D_CHUNKED ? piece_of(how.get(), line).along : 0;
+  if (piece == 0) {
     return std::nullopt;
   }
-  for (hsize_t row = 0; row < rows; row += piece) {
+  hsize_t expected = 0;
+  for (hsize_t row = 0; row < line.rows; row += piece, expected += chunk) {
     hsize_t bytes = 0;
-    if (H5Dget_chunk_storage_size(dataset, &row, &bytes) < 0 || bytes == 0) {
+    if (H5Dget_chunk_storage_size(dataset, line.place(row).data(), &bytes) < 0 || bytes == 0) {
       return row;
     }
   }
-  return std::nullopt;
+  const bool packed = H5Pget_nfilters(how.get()) != 0;
+  return packed || H5Dget_storage_size(dataset) >= expected ? std::nullopt : std::optional<hsize_t>(0);
+}
+
+/// Of two reasons the first that there is.
+std::string either(std::string first, std::string second) {
+  return first.empty() ? std::move(second) : std::move(first);
+}
+
+/// How the values of a dataset stand. Where they are in no line that could be a column, `unlike` and `remedy` of `source`
+/// say so.
+void find_line(hid_t space, Source& source) {
+  const int dimensions = H5Sget_simple_extent_ndims(space);
+  ValueLine::Place sides{0, 1};
+  if (dimensions == 1 || dimensions == 2) {
+    H5Sget_simple_extent_dims(space, sides.data(), nullptr);
+    source.line = {std::max(sides[0], sides[1]), dimensions, sides[0] == 1 && dimensions == 2 ? 1U : 0U};
+    source.line.rows = std::min(sides[0], sides[1]) == 0 ? 0 : source.line.rows;
+  }
+  const bool one_value = dimensions == 2 && sides[0] == 1 && sides[1] == 1;  // MATLAB's way of a number
+  if (dimensions != 1 && (dimensions != 2 || one_value || (sides[0] != 1 && sides[1] != 1))) {
+    source.unlike = fmt::format("has {} dimensions: expected 1", dimensions);
+    source.remedy = one_value ? "" : "write each column as a dataset of its own";
+  }
+}
+
+/// Lists a member that is no number, where it is like a column, and what is like one inside of it: nothing of it is read.
+void list_unlike_member(const Source& whole, const std::string& name, hid_t type, std::vector<Source>& sources) {
+  const H5T_class_t kind = H5Tget_class(type);
+  const auto put = [&](const std::string& path, const std::string& member, const std::string& unlike) {
+    if (recognise_log_column(member) != nullptr) {
+      sources.push_back({.path = path, .member = member, .line = whole.line, .unlike = unlike});
+    }
+  };
+  put(whole.path, name,
+      kind == H5T_ARRAY      ? "is a member with several numbers a row: expected one, or a member for each"
+      : kind == H5T_COMPOUND ? "is a member that has members itself: expected numbers in members of the dataset itself"
+                             : "holds no numbers");
+  const int inner = kind == H5T_COMPOUND ? H5Tget_nmembers(type) : 0;
+  for (int k = 0; k < inner; ++k) {
+    char* inner_name = H5Tget_member_name(type, static_cast<unsigned>(k));
+    if (inner_name != nullptr) {
+      put(whole.path + "." + name, inner_name,
+          "is a member of a member: expected numbers in members of the dataset itself");
+    }
+    H5free_memory(inner_name);
+  }
+}
+
+/// Lists the members of a dataset of a compound type.
+void list_members(const Source& whole, hid_t type, std::vector<Source>& sources) {
+  const int members = H5Tget_nmembers(type);
+  for (int k = 0; k < members; ++k) {
+    const auto index = static_cast<unsigned>(k);
+    const Handle member(H5Tget_member_type(type, index), H5Tclose);
+    char* name = H5Tget_member_name(type, index);
+    // The library takes a member's place for granted.
+    const bool inside = member && H5Tget_member_offset(type, index) + H5Tget_size(member.get()) <= H5Tget_size(type);
+    if (name != nullptr && (!inside || is_number(member.get()))) {
+      Source source = whole;
+      source.member = name;
+      source.refused =
+          either(inside ? format_defect(member.get()) : "ends outside of its row: the file is damaged", whole.refused);
+      sources.push_back(std::move(source));
+    } else if (name != nullptr) {
+      list_unlike_member(whole, name, member.get(), sources);
+    }
+    H5free_memory(name);
+  }
 }
 
 /// Lists what a dataset offers; `defect` says why it must not be opened.
 void list_dataset(hid_t file, const std::string& path, const std::string& defect, bool trust,
                   std::vector<Source>& sources) {
   if (!defect.empty()) {
-    sources.push_back({path, "", "", 0, 0, defect});
+    sources.push_back({.path = path, .refused = defect});
     return;
   }
   const Handle dataset(H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose);
   const Handle space(dataset ? H5Dget_space(dataset.get()) : -1, H5Sclose);
   const Handle type(dataset ? H5Dget_type(dataset.get()) : -1, H5Tclose);
   if (!dataset || !space || !type) {
-    sources.push_back({path, "", "", 0, 0, "cannot be opened by the HDF5 library: the file is damaged"});
+    sources.push_back({.path = path, .refused = "cannot be opened by the HDF5 library: the file is damaged"});
     return;
   }
-  const int dimensions = H5Sget_simple_extent_ndims(space.get());
-  const H5T_class_t kind = H5Tget_class(type.get());
-  if (dimensions != 1 || (!is_number(type.get()) && kind != H5T_COMPOUND)) {
-    Source source{
-        .path = path,
-        .member = "",
-        .unit = "",
-        .rows = 0,
-        .unlike = dimensions != 1 ? fmt::format("has {} dimensions: expected 1", dimensions) : "holds no numbers"};
+  Source source{.path = path};
+  find_line(space.get(), source);
+  const bool numbers = is_number(type.get());
+  if (source.unlike.empty() && !numbers && H5Tget_class(type.get()) != H5T_COMPOUND) {
+    source.unlike = "holds no numbers";
+  }
+  if (!source.unlike.empty()) {
     if (recognise_log_column(source.name()) != nullptr) {
       sources.push_back(std::move(source));
     }
     return;
   }
-  hsize_t rows = 0;
-  H5Sget_simple_extent_dims(space.get(), &rows, nullptr);
-  hsize_t chunk = 0;
-  const std::string refused = refusal(dataset.get(), type.get(), rows, trust, chunk);
-  if (is_number(type.get())) {
-    const std::optional<std::string> unit = unit_of(dataset.get());
-    const std::string strange = format_defect(type.get());
-    sources.push_back({path, "", unit.value_or(""), rows, chunk,
-                       !unit             ? "has damaged attributes"
-                       : strange.empty() ? refused
-                                         : strange});
-  } else {
-    const int members = H5Tget_nmembers(type.get());
-    for (int k = 0; k < members; ++k) {
-      const auto index = static_cast<unsigned>(k);
-      const Handle member(H5Tget_member_type(type.get(), index), H5Tclose);
-      char* name = H5Tget_member_name(type.get(), index);
-      // The library takes a member's place for granted.
-      const bool inside =
-          member && H5Tget_member_offset(type.get(), index) + H5Tget_size(member.get()) <= H5Tget_size(type.get());
-      if (name != nullptr && (!inside || is_number(member.get()))) {
-        const std::string strange =
-            inside ? format_defect(member.get()) : "ends outside of its row: the file is damaged";
-        sources.push_back({path, name, "", rows, chunk, strange.empty() ? refused : strange});
-      }
-      H5free_memory(name);
-    }
+  source.refused = refusal(dataset.get(), type.get(), source.line, trust, source.chunk);
+  if (!numbers) {
+    list_members(source, type.get(), sources);
+    return;
   }
+  const std::optional<DatasetAttributes> attributes = attributes_of(dataset.get(), type.get());
+  source.refused = either(attributes ? format_defect(type.get()) : "has damaged attributes", source.refused);
+  if (attributes) {
+    source.refused = either(source.refused, attributes->defect);
+    source.unit = attributes->clear_unit ? attributes->unit : "";
+    source.doubtful = attributes->clear_unit ? "" : "has units that are no single text";
+    source.stored = attributes->stored;
+  }
+  sources.push_back(std::move(source));
 }
 
 /// The column that the last name of a path is like; null where it is like none.
@@ -300,7 +512,7 @@ std::vector<Source> list_sources(hid_t file, const std::filesystem::path& name, 
     if (info->type == H5O_TYPE_DATASET) {
       all.datasets.emplace_back(fmt::format("/{}", path), info->addr);
     } else if (info->type != H5O_TYPE_GROUP && like_column) {
-      all.others.push_back({fmt::format("/{}", path), "", "", 0, 0, "is no dataset: the file is damaged"});
+      all.others.push_back({.path = fmt::format("/{}", path), .refused = "is no dataset: the file is damaged"});
     }
     if (like_column) {
       all.named.emplace(path);
@@ -312,8 +524,6 @@ std::vector<Source> list_sources(hid_t file, const std::filesystem::path& name, 
     auto& all = *static_cast<Found*>(to);
     if (const LogColumn* column = column_of(path); column != nullptr && !all.named.contains(path)) {
       all.others.push_back({.path = fmt::format("/{}", path),
-                            .member = "",
-                            .unit = "",
                             .unlike = fmt::format("is a link, or another name of a dataset: expected a dataset, or "
                                                   "--map {}=/GROUP/DATASET of that it leads to",
                                                   column->name)});
@@ -353,7 +563,8 @@ class ColumnReader {
  public:
   ColumnReader(hid_t file, const Source& source, std::string where)
       : where_(std::move(where)),
-        rows_(source.rows),
+        line_(source.line),
+        stored_(source.stored),
         dataset_(H5Dopen2(file, source.path.c_str(), access_to(source).get()), H5Dclose) {
     if (source.member.empty()) {
       type_ = Handle(H5Tcopy(H5T_NATIVE_DOUBLE), H5Tclose);
@@ -385,22 +596,28 @@ class ColumnReader {
   }
 
   void fill(hsize_t row) {
-    const hsize_t count = std::min<hsize_t>(rows_at_once, rows_ - row);
+    const hsize_t count = std::min<hsize_t>(rows_at_once, line_.rows - row);
     values_.resize(static_cast<std::size_t>(count));
     first_ = row;
     const Handle space(dataset_ ? H5Dget_space(dataset_.get()) : -1, H5Sclose);
-    const Handle memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
-    if (!space || H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, &row, nullptr, &count, nullptr) < 0 ||
+    const ValueLine::Place first = line_.place(row), sides = line_.sides(count);
+    const Handle memory(H5Screate_simple(line_.dimensions, sides.data(), nullptr), H5Sclose);
+    if (!space || H5Sget_simple_extent_ndims(space.get()) != line_.dimensions ||
+        H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, first.data(), nullptr, sides.data(), nullptr) < 0 ||
         H5Dread(dataset_.get(), type_.get(), memory.get(), space.get(), H5P_DEFAULT, values_.data()) < 0) {
       throw InputError(
           fmt::format("{}: rows {} to {} cannot be read: the file is damaged, or packed by a filter that is "
                       "not installed",
                       where_, row + 1, row + count));
     }
+    if (!stored_.plain()) {
+      std::ranges::transform(values_, values_.begin(), [&](double stored) { return stored_.value(stored); });
+    }
   }
 
   std::string where_;
-  hsize_t rows_;
+  ValueLine line_;
+  StoredAs stored_;
   Handle dataset_;
   Handle type_;
   std::vector<double> values_;
@@ -438,12 +655,50 @@ class DatasetChooser {
     }
     same_length();
     check_size();
+    say_unlike(home);
+    say_elsewhere(home);
     return std::move(choice_);
   }
 
  private:
+  /// A unit is a column's also where it is written as the contract writes it ("m or rad"), as create_hdf5() does.
   static const LogColumn* meaning_of(const Source& source) {
-    return recognise_log_column(source.unit.empty() ? source.name() : source.name() + " [" + source.unit + "]");
+    const LogColumn* by_name = recognise_log_column(source.name());
+    const bool own_unit = source.unit.empty() || (by_name != nullptr && by_name->unit == source.unit);
+    return own_unit ? by_name : recognise_log_column(source.name() + " [" + source.unit + "]");
+  }
+
+  /// Why a source is not taken for a column unasked; empty where it is.
+  static std::string objection(const Source& source) { return either(source.unlike, source.doubtful); }
+
+  /// Why what is named like a time is not taken for it; empty where there is nothing.
+  [[nodiscard]] std::string lost_time() const {
+    const auto lost = std::ranges::find_if(sources_, [](const Source& source) {
+      const LogColumn* column = recognise_log_column(source.name());
+      return column != nullptr && column->name == "t";
+    });
+    if (lost == sources_.end()) {
+      return "";
+    }
+    const std::string why = either(
+        lost->unlike, either(lost->doubtful, fmt::format("has the unit {}, expected s", files::shown(lost->unit))));
+    return fmt::format("; {} {}{}", lost->shown(), why,
+                       lost->unlike.empty()   ? fmt::format(": --map \"t={}*SECONDS_A_UNIT\" takes it", lost->shown())
+                       : lost->remedy.empty() ? ""
+                                              : ": " + lost->remedy);
+  }
+
+  /// Where there are times, in the order of the file.
+  [[nodiscard]] std::vector<std::string> homes_of_times() const {
+    std::vector<std::string> homes;
+    std::set<std::string> seen;
+    for (const Source& source : sources_) {
+      const LogColumn* column = meaning_of(source);
+      if (column != nullptr && column->name == "t" && objection(source).empty() && seen.insert(source.home()).second) {
+        homes.push_back(source.home());
+      }
+    }
+    return homes;
   }
 
   [[nodiscard]] std::string home_of_time() {
@@ -456,24 +711,13 @@ class DatasetChooser {
         }
       }
     }
-    std::vector<std::string> homes;
-    for (const Source& source : sources_) {
-      const LogColumn* column = meaning_of(source);
-      if (column != nullptr && column->name == "t" && source.unlike.empty() &&
-          std::ranges::find(homes, source.home()) == homes.end()) {
-        homes.push_back(source.home());
-      }
-    }
+    const std::vector<std::string> homes = homes_of_times();
     if (homes.empty()) {
-      const auto unlike = std::ranges::find_if(sources_, [](const Source& source) {
-        const LogColumn* column = source.unlike.empty() ? nullptr : meaning_of(source);
-        return column != nullptr && column->name == "t";
-      });
       throw InputError(fmt::format(
           "{}: no dataset of times: expected one called t, time or the like (in s) beside the columns, or --map "
           "t=/GROUP/DATASET: the file has {}{}",
           path_, choice_.header.empty() ? "no one-dimensional numeric dataset" : core::listed(choice_.header),
-          unlike == sources_.end() ? "" : fmt::format("; {} {}", unlike->shown(), unlike->unlike)));
+          lost_time()));
     }
     if (homes.size() > 1) {
       choice_.notes.push_back(fmt::format(
@@ -506,17 +750,44 @@ class DatasetChooser {
     const auto [place, factor] = find(mapped, home) != nullptr ? std::pair{mapped, 1.0} : split_factor(mapped);
     Source source = named(place, home, name);
     source.factor = factor;
-    if (factor != 1.0) {
-      choice_.notes.push_back(fmt::format("{} is {} times {:g}", name, source.shown(), factor));
-    }
     take(name, std::move(source));
   }
 
   void take(const std::string& name, Source source) {
     if (const std::string& why = source.refused.empty() ? source.unlike : source.refused; !why.empty()) {
-      throw InputError(fmt::format("{}: {} {}", path_, source.shown(), why));
+      throw InputError(
+          fmt::format("{}: {} {}{}", path_, source.shown(), why, source.remedy.empty() ? "" : ": " + source.remedy));
     }
+    say_numbers(name, source);
     choice_.found.insert_or_assign(name, std::move(source));
+  }
+
+  /// Says what is done to the numbers of a source.
+  void say_numbers(const std::string& name, const Source& source) {
+    std::string done;
+    const auto say = [&](double number, double none, std::string_view what) {
+      done += number == none ? "" : fmt::format(fmt::runtime(what), number);
+    };
+    say(source.stored.scale, 1.0, " times {:g} (attribute scale_factor)");
+    say(source.stored.offset, 0.0, " plus {:g} (attribute add_offset)");
+    say(source.factor, 1.0, done.empty() ? " times {:g}" : ", and that times {:g}");
+    if (!done.empty()) {
+      choice_.notes.push_back(fmt::format("{} is {}{}", name, source.shown(), done));
+    }
+    std::vector<std::string> missing;
+    for (const double number : source.stored.missing) {
+      missing.push_back(fmt::format("{:g}", number));
+    }
+    if (!missing.empty()) {
+      choice_.notes.push_back(fmt::format("{} in {} stands for no value (attribute _FillValue or missing_value)",
+                                          core::listed(missing, " or "), source.shown()));
+    }
+  }
+
+  /// Whether a column is looked for by its name.
+  [[nodiscard]] bool looked_for(const std::string& name) const {
+    return !options_.map.contains(name) &&
+           (!options_.only || name == "t" || std::ranges::find(*options_.only, name) != options_.only->end());
   }
 
   void recognise(const Source& source) {
@@ -529,12 +800,7 @@ class DatasetChooser {
       return;
     }
     const std::string& name = column->name;
-    if (options_.map.contains(name) ||
-        (options_.only && name != "t" && std::ranges::find(*options_.only, name) == options_.only->end())) {
-      return;
-    }
-    if (!source.unlike.empty()) {
-      choice_.notes.push_back(fmt::format("{} was not taken as {}: it {}", source.shown(), name, source.unlike));
+    if (!looked_for(name) || !objection(source).empty()) {
       return;
     }
     if (const auto other = choice_.found.find(name); other != choice_.found.end()) {
@@ -544,19 +810,58 @@ class DatasetChooser {
     take(name, source);
   }
 
+  /// Says what is like a column by its name beside the times, and was not taken.
+  void say_unlike(const std::string& home) {
+    for (const Source& source : sources_) {
+      const LogColumn* column = source.home() == home && !objection(source).empty() ? meaning_of(source) : nullptr;
+      if (column != nullptr && looked_for(column->name)) {
+        say_left_out(*column, source, objection(source));
+      }
+    }
+  }
+
+  /// Says, once for each column that is lacking, what is like it and as long as the times, and stands apart from them.
+  void say_elsewhere(const std::string& home) {
+    const std::vector<std::string> homes = homes_of_times();
+    const std::set<std::string> logs(homes.begin(), homes.end());
+    std::set<std::string> said;
+    for (const Source& source : sources_) {
+      const LogColumn* column = meaning_of(source);
+      if (column != nullptr && looked_for(column->name) && !choice_.found.contains(column->name) &&
+          source.home() != home && source.refused.empty() && of_these_rows(source) && !logs.contains(source.home()) &&
+          said.insert(column->name).second) {
+        say_left_out(*column, source,
+                     either(objection(source), fmt::format("lies in another group than the times: --map {}={} takes it",
+                                                           column->name, source.shown())));
+      }
+    }
+  }
+
+  void say_left_out(const LogColumn& column, const Source& source, const std::string& why) {
+    const bool mendable = of_these_rows(source) && !source.remedy.empty();
+    choice_.notes.push_back(fmt::format(
+        "{} was not taken as {}: it {}{}{}", source.shown(), column.name, why, mendable ? ": " + source.remedy : "",
+        source.doubtful.empty() ? "" : fmt::format(": --map \"{}={}*FACTOR\" takes it", column.name, source.shown())));
+  }
+
+  /// Whether a source has as many rows as the times.
+  [[nodiscard]] bool of_these_rows(const Source& source) const {
+    return source.line.rows == choice_.found.at("t").line.rows;
+  }
+
   void same_length() const {
     const Source& time = choice_.found.at("t");
     for (const auto& [name, source] : choice_.found) {
-      if (source.rows != time.rows) {
+      if (!of_these_rows(source)) {
         throw InputError(fmt::format("{}: {} has {} values and {} has {}: expected as many values as times", path_,
-                                     source.shown(), source.rows, time.shown(), time.rows));
+                                     source.shown(), source.line.rows, time.shown(), time.line.rows));
       }
     }
   }
 
   /// Values that were never written, or pack too well, cost as much as others.
   void check_size() const {
-    const hsize_t rows = choice_.found.at("t").rows;
+    const hsize_t rows = choice_.found.at("t").line.rows;
     const std::uint64_t columns = choice_.found.size(), most = files::most_unpacked(file_bytes_);
     if (!options_.trust && rows > most / sizeof(double) / columns) {
       throw InputError(
@@ -582,7 +887,7 @@ class Hdf5Walk final : public RowWalk {
         row_(names.size() + 1),
         hashed_(report != nullptr),
         file_(open_file(path)),
-        rows_(choice.found.at("t").rows) {
+        rows_(choice.found.at("t").line.rows) {
     cleaner_.set_longest_step(longest_step);
     cleaner_.begin_file(path.string() + ": row ");
     open_column("t");
@@ -675,11 +980,11 @@ class Hdf5File final : public RowFile {
  private:
   void refuse_unwritten(hid_t file, const Source& source) const {
     const Handle dataset(H5Dopen2(file, source.path.c_str(), H5P_DEFAULT), H5Dclose);
-    if (const auto row = dataset ? first_unwritten(dataset.get(), source.rows) : std::nullopt) {
+    if (const auto row = dataset ? first_unwritten(dataset.get(), source.line, source.chunk) : std::nullopt) {
       throw InputError(fmt::format(
           "{}: {} has {} values, of which row {} and others were never written or are lost: expected a whole "
           "log, or --trust, which takes what HDF5 puts in their place",
-          path_.string(), source.shown(), source.rows, *row + 1));
+          path_.string(), source.shown(), source.line.rows, *row + 1));
     }
   }
 

@@ -75,6 +75,17 @@ std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& 
       throw InputError(paths[k].string() + ": was written to while it was read: expected a log that is complete");
     }
   }
+  const std::vector<LogFileReport>& read = log->report().files;
+  for (std::size_t k = 1; k < read.size(); ++k) {
+    const auto same = std::find_if(read.begin(), read.begin() + static_cast<std::ptrdiff_t>(k),
+                                   [&](const LogFileReport& file) { return file.hash == read[k].hash; });
+    if (same != read.begin() + static_cast<std::ptrdiff_t>(k) && !same->hash.empty()) {
+      throw InputError(
+          fmt::format("{}: has the bytes of {}: expected each log once, since the errors of what is read "
+                      "twice count as new ones",
+                      read[k].path, same->path));
+    }
+  }
   return log;
 }
 

@@ -24,7 +24,8 @@ struct LogOptions : CsvOptions {
 /// Opens a log in one or several files or bag directories, told apart by their content; each begins a new segment.
 /// All of it is read once, as RowLog says, and kept in memory where 256 MiB are enough for that (RowLogOptions).
 /// `LogOptions::map` and `extra` name columns of CSV and HDF5 files and fields of bags (TOPIC.FIELD, bag_log.hpp).
-/// Throws InputError, naming file and place, for what cannot be read; InvalidArgument when `paths` is empty.
+/// Throws InputError, naming file and place, for what cannot be read, and for a file with the bytes of another;
+/// InvalidArgument when `paths` is empty.
 [[nodiscard]] std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& paths,
                                                     const LogOptions& options = {});
 

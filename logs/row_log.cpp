@@ -17,6 +17,48 @@
 
 namespace wheelwright::logs {
 
+namespace {
+
+constexpr double turn = 2.0 * std::numbers::pi;
+
+}  // namespace
+
+double WheelAngle::follow(double time, double angle, bool predict) {
+  constexpr double slack = 1e-3;
+  const double step = angle - before_, seconds = time - time_;
+  least_ = std::min(least_, angle);
+  most_ = std::max(most_, angle);
+  const bool known = predict && std::isfinite(rate_);
+  const double expected = known ? rate_ * seconds : 0.0;
+  double turns = -std::round(step / turn);
+  if (!wrapped_) {
+    const bool jump = known && turns != 0.0 && most_ - least_ <= turn + slack &&
+                      std::abs(step + turns * turn - expected) < 0.25 * turn;
+    wrapped_ = jump;
+    turns = jump ? turns : 0.0;
+  } else if (known) {
+    const double nearest = std::round((expected - step) / turn);
+    turns = std::abs(step + nearest * turn - expected) < 0.25 * turn ? nearest : turns;
+  }
+  jumped_ = turns != 0.0;
+  turns_ += turns;
+  rate_ = (step + turns * turn) / seconds;
+  before_ = angle;
+  time_ = time;
+  return angle + turns_ * turn;
+}
+
+double WheelAngle::begin(double time, double angle) {
+  least_ = std::min(least_, angle);
+  most_ = std::max(most_, angle);
+  rate_ = std::numeric_limits<double>::quiet_NaN();
+  turns_ = 0.0;
+  jumped_ = false;
+  before_ = angle;
+  time_ = time;
+  return angle;
+}
+
 RowCleaner::RowCleaner(const std::vector<std::string>& names, LogReport* report) : names_{"t"}, report_(report) {
   names_.insert(names_.end(), names.begin(), names.end());
   for (const std::string& name : names_) {
@@ -25,7 +67,7 @@ RowCleaner::RowCleaner(const std::vector<std::string>& names, LogReport* report)
     if (name == "theta") {
       theta_ = limits_.size() - 1;
     } else if (name == "phi_r" || name == "phi_l") {
-      wheels_.push_back({.index = limits_.size() - 1});
+      wheels_.emplace_back(limits_.size() - 1, WheelAngle());
     }
   }
 }
@@ -33,8 +75,8 @@ RowCleaner::RowCleaner(const std::vector<std::string>& names, LogReport* report)
 void RowCleaner::begin_file(std::string place) {
   place_ = std::move(place);
   fresh_ = true;
-  for (WheelAngle& wheel : wheels_) {
-    wheel = {.index = wheel.index};
+  for (auto& [index, wheel] : wheels_) {
+    wheel = {};
   }
 }
 
@@ -64,8 +106,11 @@ RowOutcome RowCleaner::place(std::span<double> row, std::size_t number) {
   if (theta_ != 0) {
     unwrap(row[theta_], starts, number);
   }
-  for (WheelAngle& wheel : wheels_) {
-    unwrap(wheel, row[wheel.index], starts, number);
+  for (auto& [index, wheel] : wheels_) {
+    row[index] = starts ? wheel.begin(t, row[index]) : wheel.follow(t, row[index]);
+    if (wheel.jumped() && report_ != nullptr && report_->angle_wraps.count++ == 0) {
+      report_->angle_wraps.first = at(number) + ", column " + names_[index];
+    }
   }
   return starts ? RowOutcome::new_segment : RowOutcome::row;
 }
@@ -89,35 +134,13 @@ void RowCleaner::unwrap(double& theta, bool new_segment, std::size_t number) {
   if (new_segment) {
     turns_ = 0.0;
   } else if (std::abs(theta - theta_before_) > std::numbers::pi) {
-    turns_ -= std::round((theta - theta_before_) / (2.0 * std::numbers::pi));
+    turns_ -= std::round((theta - theta_before_) / turn);
     if (report_ != nullptr && report_->wraps.count++ == 0) {
       report_->wraps.first = at(number);
     }
   }
   theta_before_ = theta;
-  theta += turns_ * 2.0 * std::numbers::pi;
-}
-
-void RowCleaner::unwrap(WheelAngle& wheel, double& angle, bool new_segment, std::size_t number) {
-  constexpr double turn = 2.0 * std::numbers::pi, small = 0.5 * std::numbers::pi, slack = 1e-3;
-  constexpr std::size_t few = 3;
-  const double step = angle - wheel.before;
-  wheel.least = std::min(wheel.least, angle);
-  wheel.most = std::max(wheel.most, angle);
-  if (new_segment) {
-    wheel.turns = 0.0;
-  } else if (std::abs(step) > std::numbers::pi && std::abs(std::abs(step) - turn) < small && wheel.steps >= few &&
-             wheel.largest_step < small && wheel.most - wheel.least <= turn + slack) {
-    wheel.turns -= std::copysign(1.0, step);
-    if (report_ != nullptr && report_->angle_wraps.count++ == 0) {
-      report_->angle_wraps.first = at(number) + ", column " + names_[wheel.index];
-    }
-  } else {
-    wheel.largest_step = std::max(wheel.largest_step, std::abs(step));
-    ++wheel.steps;
-  }
-  wheel.before = angle;
-  angle += wheel.turns * turn;
+  theta += turns_ * turn;
 }
 
 void RowCleaner::count(Occurrences LogReport::*what, std::size_t number, std::string_view detail) {
@@ -356,7 +379,6 @@ bool RowLog::next(LogBlock& block) {
 
 namespace {
 
-constexpr double turn = 2.0 * std::numbers::pi;
 constexpr double unseen = 9.0 / 8.0;
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <wheelwright/logs/recorded_log.hpp>
@@ -23,6 +24,31 @@ enum class RowOutcome {
   dropped,      ///< a defect; counted
   row,          ///< continues the segment
   new_segment,  ///< begins a segment
+};
+
+/// A wheel angle that may be wrapped, made continuous. It counts as wrapped from the first jump on that nothing else
+/// explains: by more than half a turn, while all values so far lie within one turn, and with the turn taken away within
+/// a quarter of a turn of where the last step leads. From then on every step is the one
+/// that is closest to the last, per second, or the shortest where none of them is within a quarter of a turn of it.
+class WheelAngle {
+ public:
+  /// `angle` (rad) at `time` (s), later than the last one, with the turns that were undone. `predict` is false where so
+  /// much time has passed that the last step says nothing of this one.
+  double follow(double time, double angle, bool predict = true);
+  /// The same where what came before says nothing: no turns are added.
+  double begin(double time, double angle);
+  /// Whether a turn was undone by the last call of follow().
+  [[nodiscard]] bool jumped() const { return jumped_; }
+  /// Time of the last value, s; NaN before the first.
+  [[nodiscard]] double time() const { return time_; }
+
+ private:
+  double time_ = std::numeric_limits<double>::quiet_NaN();
+  double before_ = 0.0;  // as logged
+  double turns_ = 0.0;   // to add
+  double least_ = std::numeric_limits<double>::infinity(), most_ = -least_;
+  double rate_ = std::numeric_limits<double>::quiet_NaN();  // of the last step, rad/s
+  bool wrapped_ = false, jumped_ = false;
 };
 
 /// The cleaning of a log, row by row. A row is its time and the values of `names`.
@@ -41,9 +67,7 @@ class RowCleaner {
   [[nodiscard]] const std::vector<double>& limits() const { return limits_; }
 
   /// Decides by its time what a row is whose values are finite and within limits(), and unwraps its angles in place:
-  /// the heading wherever it jumps by more than π, a wheel angle (phi_r, phi_l) where it jumps by nearly a turn and
-  /// cannot but be wrapped: all its values so far lie within one turn, and every other step (three at least), and this
-  /// one with the turn taken away, is below π/2.
+  /// the heading wherever it jumps by more than π, a wheel angle (phi_r, phi_l) as WheelAngle does.
   RowOutcome place(std::span<double> row, std::size_t number);
 
   /// The same for any row: one that has a value which is not finite is dropped. Throws InputError, naming the column,
@@ -63,18 +87,7 @@ class RowCleaner {
   [[nodiscard]] std::string expectation(std::size_t index) const;
 
  private:
-  // A wheel angle, which may be wrapped or not.
-  struct WheelAngle {
-    std::size_t index = 0;
-    double before = 0.0;  // as logged
-    double turns = 0.0;   // to add
-    double least = std::numeric_limits<double>::infinity(), most = -least;
-    double largest_step = 0.0;  // that is not a wrap
-    std::size_t steps = 0;      // that are none
-  };
-
   void unwrap(double& theta, bool new_segment, std::size_t number);
-  void unwrap(WheelAngle& wheel, double& angle, bool new_segment, std::size_t number);
 
   std::vector<std::string> names_;  ///< time, then the columns
   std::vector<double> limits_;
@@ -82,11 +95,11 @@ class RowCleaner {
   double longest_step_ = std::numeric_limits<double>::infinity();
   std::string place_;
   double t_ = 0.0;
-  bool fresh_ = true;          ///< the next row begins a segment whatever its time
-  std::size_t theta_ = 0;      ///< index of the heading, 0 where there is none
-  double theta_before_ = 0.0;  ///< as logged
-  double turns_ = 0.0;         ///< whole turns to add
-  std::vector<WheelAngle> wheels_;
+  bool fresh_ = true;                                       ///< the next row begins a segment whatever its time
+  std::size_t theta_ = 0;                                   ///< index of the heading, 0 where there is none
+  double theta_before_ = 0.0;                               ///< as logged
+  double turns_ = 0.0;                                      ///< whole turns to add
+  std::vector<std::pair<std::size_t, WheelAngle>> wheels_;  ///< by index
 };
 
 /// One walk through the rows of one file.

@@ -31,6 +31,13 @@ TEST(XmlText, CharactersByNumberAreReadWhereTheyAreAscii) {
   EXPECT_EQ(xml.attribute(0, "b"), "M&#9999;\"");
 }
 
+// Found by the fuzzer of simulator files: the parser takes a vertical tab for white space, and the joint had no name here.
+TEST(XmlText, WhiteSpaceIsWhatTheParserTakesForIt) {
+  const XmlText xml = XmlText::parse("<a\vb\f=\v'1'\fc='2'/>", "a.xml");
+  EXPECT_EQ(xml.attribute(0, "b"), "1");
+  EXPECT_EQ(xml.attribute(0, "c"), "2");
+}
+
 TEST(XmlText, EditsReplaceTheirBytesAlone) {
   XmlText xml = XmlText::parse(kSample, "a.xml");
   const auto mass = *xml.child(*xml.child(0, "link"), "mass");

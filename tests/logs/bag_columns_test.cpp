@@ -282,5 +282,46 @@ TEST(SideOfJoint, IsAWordOfTheNameAndNeverBoth) {
   EXPECT_EQ(side_of_joint(""), "");
 }
 
+TEST(BagColumns, WhatWasWishedForIsNoMeasurement) {
+  Bag bag;
+  bag.add("/goal_pose", "geometry_msgs/msg/PoseStamped");
+  bag.add("/odom", "nav_msgs/msg/Odometry");
+  bag.add("/joint_command", "sensor_msgs/msg/JointState", {"left_wheel", "right_wheel"}, {"velocity"});
+  bag.add("/joint_states", "sensor_msgs/msg/JointState", {"left_wheel", "right_wheel"}, {"position"});
+  const auto places = bag.places();
+  EXPECT_EQ(places.at("x"), "/odom.pose.pose.position.x");
+  EXPECT_EQ(places.at("phi_r"), "/joint_states.position[right_wheel]");
+  EXPECT_FALSE(places.contains("omega_r"));
+  EXPECT_THAT(bag.choose().notes, Contains(HasSubstr("/goal_pose")));
+  EXPECT_THAT(bag.choose().notes, Contains(HasSubstr("/joint_command")));
+}
+
+TEST(BagColumns, FingersAreNoWheels) {
+  Bag bag;
+  bag.add("/joint_states", "sensor_msgs/msg/JointState", {"left_wheel", "right_wheel"}, {"velocity"});
+  bag.add("/gripper", "sensor_msgs/msg/JointState", {"left_finger", "right_finger"}, {"effort"});
+  bag.add("/drives", "sensor_msgs/msg/JointState", {"left_motor", "right_motor"}, {"position"});
+  const auto places = bag.places();
+  EXPECT_FALSE(places.contains("tau_r"));
+  EXPECT_EQ(places.at("phi_r"), "/drives.position[right_motor]");
+  EXPECT_THAT(bag.choose().notes, Contains(HasSubstr("--map tau_r=/gripper.effort[right_finger]")));
+}
+
+TEST(BagColumns, AWheelOfNoSideLeavesNoSumOfTheOthers) {
+  Bag bag;
+  bag.add("/joint_states", "sensor_msgs/msg/JointState", {"f_l_wheel", "f_r_wheel", "r_l_wheel", "r_r_wheel"},
+          {"effort"});
+  EXPECT_THAT(bag.choose().sources, IsEmpty());
+  EXPECT_THAT(bag.choose().notes, Contains(HasSubstr("r_l_wheel")));
+}
+
+TEST(BagColumns, APoseThatWasPassedOverIsSaid) {
+  Bag bag;
+  bag.add("/amcl_pose", "geometry_msgs/msg/PoseWithCovarianceStamped");
+  bag.add("/odom", "nav_msgs/msg/Odometry");
+  EXPECT_EQ(bag.places().at("x"), "/amcl_pose.pose.pose.position.x");
+  EXPECT_THAT(bag.choose().notes, Contains(HasSubstr("x of /amcl_pose was taken before that of /odom")));
+}
+
 }  // namespace
 }  // namespace wheelwright::logs::bag_columns_test
