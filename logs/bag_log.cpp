@@ -370,7 +370,7 @@ class BagWalk final : public RowWalk {
       damage(reading, "its time is more than 146 years away");
       return;
     }
-    find_values(reading);
+    find_values(reading, reading.numbers);
     if (std::ranges::all_of(reading.values, [](double value) { return std::isnan(value); })) {
       ++reading.without;
       return;
@@ -405,8 +405,8 @@ class BagWalk final : public RowWalk {
   }
 
   /// What the columns make of the numbers.
-  static void find_values(Reading& reading) {
-    const double* number = reading.numbers.data();
+  static void find_values(Reading& reading, const std::vector<double>& numbers) {
+    const double* number = numbers.data();
     for (std::size_t k = 0; k < reading.columns.size(); ++k) {
       reading.values[k] = value_of(reading.columns[k], number);
       number += reading.columns[k].fields.size();
@@ -414,12 +414,12 @@ class BagWalk final : public RowWalk {
   }
 
   /// Undoes the whole turns of wheel angles, joint by joint.
-  void unwrap(Reading& reading, const Waiting& message) {
+  void unwrap(Reading& reading, Waiting& message) {
     const double time = static_cast<double>(message.time) / static_cast<double>(one_second);
     std::size_t at = 0;
     for (const BagColumn& column : reading.columns) {
       for (const std::string& field : column.fields) {
-        double& number = reading.numbers[at];
+        double& number = message.numbers[at];
         std::optional<WheelAngle>& angle = reading.angles[at++];
         if (!angle || !std::isfinite(number) || column.factor == 0.0 || time == angle->time()) {
           continue;
@@ -454,9 +454,8 @@ class BagWalk final : public RowWalk {
     Reading& reading = readings_[k];
     std::deque<Waiting>& waiting = reading.waiting;
     while (!waiting.empty() && waiting.front().time <= until) {
-      reading.numbers = waiting.front().numbers;
       unwrap(reading, waiting.front());
-      find_values(reading);
+      find_values(reading, waiting.front().numbers);
       aligner_->push(k, waiting.front().time, reading.values);
       waiting.pop_front();
     }
