@@ -26,6 +26,8 @@ std::vector<std::string> choices_in(const std::string& type) {
   return out;
 }
 
+}  // namespace
+
 OptionWords words_of(const CLI::Option& option) {
   OptionWords out;
   for (const std::string& name : option.get_snames()) {
@@ -49,6 +51,8 @@ OptionWords words_of(const CLI::Option& option) {
   return out;
 }
 
+namespace {
+
 CommandWords words_of_one(const CLI::App& app) {
   CommandWords out{app.get_name(), app.get_description(), {}, app.get_footer()};
   for (const CLI::Option* option : app.get_options()) {
@@ -71,7 +75,8 @@ std::vector<std::string> names_of(const CommandWords& command) {
 }
 
 bool OptionWords::takes_file() const {
-  static const std::vector<std::string> files = {"FILE", "LOG", "MODEL", "SCENARIO", "STUDY", "LIST", "IN", "OUT"};
+  static const std::vector<std::string> files = {"FILE", "LOG",    "MODEL", "SCENARIO", "STUDY",
+                                                 "LIST", "BEFORE", "AFTER", "IN OUT"};
   return choices.empty() && std::find(files.begin(), files.end(), value) != files.end();
 }
 
@@ -87,6 +92,21 @@ ProgramWords words_of(const CLI::App& program) {
     out.commands.push_back(words_of_one(*command));
   }
   return out;
+}
+
+std::vector<std::filesystem::path> files_read(const CLI::App& command) {
+  static const std::vector<std::string> written = {"--out", "--out-file", "--series"};
+  std::vector<std::filesystem::path> read;
+  for (const CLI::Option* option : command.get_options()) {
+    const OptionWords words = words_of(*option);
+    const bool writes = std::ranges::any_of(
+        words.names, [](const std::string& name) { return std::ranges::find(written, name) != written.end(); });
+    if (!writes && (words.takes_file() || words.takes_directory())) {
+      const std::vector<std::string> given = option->results();
+      read.insert(read.end(), given.begin(), given.end());
+    }
+  }
+  return read;
 }
 
 std::string first_sentence(const std::string& description) {

@@ -4,14 +4,16 @@
 /// the scripts by which a shell completes them.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
 namespace CLI {
 
 class App;
+class Option;
 
-}
+}  // namespace CLI
 
 namespace wheelwright::app {
 
@@ -54,6 +56,11 @@ struct ProgramWords {
 
 /// The words of `program` as it is registered.
 [[nodiscard]] ProgramWords words_of(const CLI::App& program);
+
+/// The words of `option` as it is registered.
+[[nodiscard]] OptionWords words_of(const CLI::Option& option);
+/// What the options of a `command` that was parsed name to be read: files and directories, but for the places to write.
+[[nodiscard]] std::vector<std::filesystem::path> files_read(const CLI::App& command);
 
 /// The first sentence of a description without its end: "Looks for faults in a log with a commissioned model".
 [[nodiscard]] std::string first_sentence(const std::string& description);

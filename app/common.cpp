@@ -10,16 +10,19 @@
 #include <cstring>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <mutex>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
+#include <wheelwright/logs/csv.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/model/robot.hpp>
 #include <wheelwright/report/signals.hpp>
@@ -42,7 +45,18 @@ void put(std::FILE* stream, std::string_view text) {
 
 void write_text(std::FILE* stream, std::string_view text) { put(stream, files::printable(text)); }
 
-void say_lines(std::string_view text) { write_text(stdout, text); }
+namespace {
+
+bool& standard_output_is_taken() {
+  static bool taken = false;
+  return taken;
+}
+
+}  // namespace
+
+std::FILE* stream_of_words() { return standard_output_is_taken() ? stderr : stdout; }
+
+void say_lines(std::string_view text) { write_text(stream_of_words(), text); }
 
 void tell_error(std::string_view message) {
   std::string text = "wheelwright: ";
@@ -133,13 +147,17 @@ constexpr std::chrono::seconds kOneRun(10);  // between files that one run write
 
 constexpr std::string_view kGenerator = "<meta name=\"generator\" content=\"wheelwright ";
 
-// Pipes, devices and what the program was started with ("/dev/stdout") are written to, whatever is there.
+// What the program was started with: "/dev/stdout".
+bool is_own_stream(const std::filesystem::path& out) {
+  std::error_code none;
+  const std::filesystem::path parent = out.parent_path();
+  return parent == "/dev/fd" || parent == "/proc/self/fd" ||
+         std::filesystem::read_symlink(out, none).native().starts_with("/proc/self/fd/");
+}
+
 bool is_there(const std::filesystem::path& out) {
   std::error_code none;
-  const std::filesystem::file_status there = std::filesystem::status(out, none);
-  const bool own_stream =
-      out.parent_path() == "/dev/fd" || std::filesystem::read_symlink(out, none).native().starts_with("/proc/self/fd/");
-  return std::filesystem::exists(there) && !std::filesystem::is_other(there) && !own_stream;
+  return std::filesystem::exists(out, none) && !is_stream(out);
 }
 
 std::string beginning(const std::filesystem::path& file) {
@@ -217,11 +235,71 @@ void keep_existing(const CommonOptions& options, const std::filesystem::path& ou
   }
 }
 
-void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesystem::path>& read) {
-  for (const std::filesystem::path& path : read) {
+bool is_stream(const std::filesystem::path& out) {
+  std::error_code none;
+  const std::filesystem::file_status there = std::filesystem::status(out, none);
+  return std::filesystem::exists(there) && (std::filesystem::is_other(there) || is_own_stream(out));
+}
+
+void leave_standard_output(const CommonOptions& options, const std::filesystem::path& out) {
+  struct stat there {
+  }, ours{};
+  if (!is_own_stream(out) || stat(out.c_str(), &there) != 0 || fstat(STDOUT_FILENO, &ours) != 0 ||
+      there.st_dev != ours.st_dev || there.st_ino != ours.st_ino) {
+    return;
+  }
+  if (options.json) {
+    throw InputError(out.string() + ": is the standard output, where --json prints: expected one of them");
+  }
+  standard_output_is_taken() = true;
+}
+
+std::unique_ptr<logs::LogWriter> create_output(const std::filesystem::path& out, const std::vector<std::string>& names,
+                                               const logs::LogWriteOptions& options) {
+  return is_stream(out) && !out.has_extension() ? logs::create_csv(out, names) : logs::create_log(out, names, options);
+}
+
+namespace {
+
+// Whether `path` is one of the files of the recording in `directory`: of those that its metadata.yaml names or, without
+// one, of all of a recording's kinds.
+bool is_of_recording(const std::filesystem::path& path, const std::filesystem::path& directory) {
+  std::error_code none;
+  const std::filesystem::path parent = path.has_parent_path() ? path.parent_path() : ".";
+  if (!std::filesystem::is_directory(directory, none) || !std::filesystem::equivalent(parent, directory, none) ||
+      !std::filesystem::exists(path, none)) {
+    return false;
+  }
+  const std::string name = path.filename().string();
+  if (std::ifstream metadata(directory / "metadata.yaml", std::ios::binary); metadata) {
+    const std::string text(std::istreambuf_iterator<char>(metadata), {});
+    return name == "metadata.yaml" || text.find(name) != std::string::npos;
+  }
+  return name.ends_with(".mcap") || name.ends_with(".db3") || name.ends_with(".zstd");
+}
+
+}  // namespace
+
+bool is_read(const std::filesystem::path& path, const std::vector<std::filesystem::path>& read) {
+  return std::ranges::any_of(read, [&](const std::filesystem::path& each) {
     std::error_code neither;
-    if (std::filesystem::equivalent(out, path, neither)) {
-      throw InputError(out.string() + ": is what is read: expected another name");
+    return std::filesystem::equivalent(path, each, neither) || is_of_recording(path, each);
+  });
+}
+
+void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesystem::path>& read) {
+  if (is_read(out, read)) {
+    throw InputError(out.string() + ": is what is read: expected another name");
+  }
+}
+
+void keep_inputs(const CommonOptions& options, const std::vector<std::string>& files,
+                 const std::vector<std::filesystem::path>& read) {
+  std::vector<std::string> names = files;
+  names.emplace_back(kPage);
+  for (const std::string& name : names) {
+    if (!options.out.empty() && is_read(options.out / name, read)) {
+      throw InputError((options.out / name).string() + ": is what is read: expected another directory");
     }
   }
 }
@@ -288,6 +366,7 @@ void make_directory(const CommonOptions& options, const std::vector<std::string>
   if (options.out.empty()) {
     return;
   }
+  keep_inputs(options, files, options.read);
   const std::lock_guard<std::mutex> guard(made_mutex());
   create_out(options);
   if (files.empty() || place_of(options) != nullptr) {

@@ -57,7 +57,14 @@ struct CommonOptions {
   bool trust = false;                           ///< a log may reach for files beside it
   std::vector<std::string> despite;             ///< the doctor's findings that are passed over
   std::string command_line;                     ///< as the user gave it
+  std::vector<std::filesystem::path> read;      ///< what the command line names to be read
 };
+
+/// Where say() prints: standard output, but for leave_standard_output().
+[[nodiscard]] std::FILE* stream_of_words();
+/// Leaves standard output to the result `out` where that is it, by any name: what is said goes to standard error from then
+/// on. Throws InputError with --json, which prints there, too.
+void leave_standard_output(const CommonOptions& options, const std::filesystem::path& out);
 
 /// Writes a text on a stream, fit for a terminal (files::printable). What goes wrong is found by finished().
 void write_text(std::FILE* stream, std::string_view text);
@@ -76,12 +83,12 @@ void write_values(std::FILE* stream, fmt::string_view text, const Values&... val
   const auto write = [&](const auto&... fit) { write_text(stream, fmt::vformat(text, fmt::make_format_args(fit...))); };
   write(in_line(values)...);
 }
-/// Prints on standard output with write_values().
+/// Prints on stream_of_words() with write_values().
 template <typename... Values>
 void say(fmt::format_string<Values...> text, Values&&... values) {
-  write_values(stdout, text, values...);
+  write_values(stream_of_words(), text, values...);
 }
-/// Prints a text of several lines on standard output with write_text().
+/// Prints a text of several lines on stream_of_words() with write_text().
 void say_lines(std::string_view text);
 /// Prints a result and a line end on standard output.
 void say_json(const Json& result);
@@ -118,11 +125,24 @@ void say_line(std::string_view line);
 /// with a text that holds `mark`, which what the command itself writes there has. Pipes and devices are written to.
 void keep_existing(const CommonOptions& options, const std::filesystem::path& out, std::string_view mark = {});
 
-/// Throws InputError where writing `out` would replace one of the files `read`.
+/// Whether `path` is one of the files `read`, or of the recordings among them that are directories.
+[[nodiscard]] bool is_read(const std::filesystem::path& path, const std::vector<std::filesystem::path>& read);
+/// Throws InputError where writing `out` would replace what is_read().
 void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesystem::path>& read);
+/// keep_inputs() for what a command may write into --out: `files` and report.html.
+void keep_inputs(const CommonOptions& options, const std::vector<std::string>& files,
+                 const std::vector<std::filesystem::path>& read);
 
-/// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible, and, unless --force
-/// is given, where something else would be replaced than the command's own earlier result. `files` are the names that
+/// Whether `out` is no file but a stream, which is written to as it is: a pipe, a device, /dev/stdout.
+[[nodiscard]] bool is_stream(const std::filesystem::path& out);
+/// logs::create_log(); a stream whose name has no ending takes CSV.
+[[nodiscard]] std::unique_ptr<logs::LogWriter> create_output(const std::filesystem::path& out,
+                                                             const std::vector<std::string>& names,
+                                                             const logs::LogWriteOptions& options);
+
+/// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible, where a result would
+/// replace what the command line names to be read, and, unless --force is given, where something else would be replaced
+/// than the command's own earlier result. `files` are the names that
 /// it may write beside report.html: first the result, KIND.json of the schema wheelwright/KIND, by which it knows itself,
 /// then what else it writes, which is its own where it is not younger than that. Where there are any, `out` is locked
 /// until the program ends: InputError where another one writes results into it, unless both share it.

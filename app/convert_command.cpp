@@ -41,13 +41,15 @@ int run(const Arguments& a) {
   from.pop_back();
   keep_inputs(to, from);
   keep_existing(a.common, to);
+  leave_standard_output(a.common, to);
+  make_directory(a.common, {"convert.json"});
   const std::unique_ptr<logs::RecordedLog> log = logs::open_log(from, reader_options(a.common));
   const logs::LogReport& report = log->report();
   logs::LogWriteOptions options;
   options.compression = a.compression;
   options.time_origin = report.files.front().time_origin;
   Progress progress(a.common.quiet);
-  const auto writer = logs::create_log(to, log->columns(), options);
+  const auto writer = create_output(to, log->columns(), options);
   LogBlock block;
   std::size_t rows = 0;
   while (log->next(block)) {
@@ -57,17 +59,16 @@ int run(const Arguments& a) {
   }
   writer->commit();
   const std::vector<std::string> said = logs::sentences(report);
-  if (a.common.json) {
-    const Json json = {{"schema", "wheelwright/convert/1"},
-                       {"file", to.string()},
-                       {"rows", report.rows},
-                       {"rows_read", report.rows_read},
-                       {"segments", report.segments},
-                       {"seconds", report.seconds},
-                       {"columns", log->columns()},
-                       {"notes", said}};
-    say_json(json);
-  } else if (!a.common.quiet) {
+  const Json json = {{"schema", "wheelwright/convert/1"},
+                     {"file", to.string()},
+                     {"rows", report.rows},
+                     {"rows_read", report.rows_read},
+                     {"segments", report.segments},
+                     {"seconds", report.seconds},
+                     {"columns", log->columns()},
+                     {"notes", said}};
+  publish(a.common, json, "convert.json", {});
+  if (!a.common.json && !a.common.quiet) {
     print_log(said);
     say("wrote {}: {} rows, {:.6g} s in {} segment{}, columns t", to.string(), report.rows, report.seconds,
         report.segments, report.segments == 1 ? "" : "s");

@@ -83,7 +83,7 @@ std::vector<std::filesystem::path> series_files(const Arguments& a, const Online
   std::vector<std::filesystem::path> files;
   if (!a.series.empty()) {
     files.push_back(a.series);
-    if (model.kinematic) {
+    if (model.kinematic && !is_stream(a.series)) {
       files.push_back(kinematic_series(a.series));
     }
     if (a.layouts) {
@@ -100,7 +100,11 @@ std::vector<std::filesystem::path> write_all_series(const Arguments& a, logs::Re
                                                     const OnlineModel& model, bool kinematic) {
   const double origin = log.report().files.front().time_origin;
   std::vector<Series> series = {write_series(a.series, log, model, a.detector, origin)};
-  if (kinematic) {
+  if (kinematic && is_stream(a.series)) {
+    tell(
+        "wheelwright detect: {}: a stream, which takes the torque residual alone: expected a file for both residuals\n",
+        a.series.string());
+  } else if (kinematic) {
     series.push_back(write_series(kinematic_series(a.series), log, *model.kinematic, a.detector, origin));
   }
   std::vector<std::filesystem::path> written;
@@ -116,7 +120,41 @@ std::vector<std::filesystem::path> write_all_series(const Arguments& a, logs::Re
   return written;
 }
 
+// Options that do not go together.
+void check_together(const Arguments& a) {
+  if (a.follow) {
+    if (!a.series.empty() || a.layouts) {
+      throw InputError(std::string(a.layouts ? "--layouts" : "--series") +
+                       ": expected a LOG instead of --follow, which tells events alone");
+    }
+    return;
+  }
+  if (a.heartbeat > 0.0) {
+    throw InputError("--heartbeat: expected --follow, which it is of");
+  }
+  if (a.log.empty()) {
+    throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
+  }
+  if (a.layouts && (a.series.empty() || is_stream(a.series))) {
+    throw InputError("--layouts: expected --series FILE, which they show" +
+                     std::string(a.series.empty() ? "" : " and stand beside"));
+  }
+}
+
+int follow_input(const Arguments& a, const OnlineModel& model, TorqueDetector detector,
+                 const logs::LogOptions& reader) {
+  FollowOptions how{.json = a.common.json, .heartbeat = a.heartbeat, .events = {}, .fresh = a.common.force};
+  if (!a.common.out.empty()) {
+    make_directory(a.common);
+    how.events = a.common.out / "events.jsonl";
+    keep_inputs(how.events, a.common.read);
+    keep_existing(a.common, how.events, kEventsSchema);
+  }
+  return follow(STDIN_FILENO, std::move(detector), model, a.detector, reader, how);
+}
+
 int run(const Arguments& a) {
+  check_together(a);
   OnlineModel model = read_model(a.model);
   model.persistence = a.persistence.value_or(model.persistence);
   if (model.kinematic) {
@@ -126,26 +164,12 @@ int run(const Arguments& a) {
   logs::LogOptions reader = reader_options(a.common);
   reader.only = robots::useful_columns(model.robot);
   if (a.follow) {
-    FollowOptions how{.json = a.common.json, .heartbeat = a.heartbeat, .events = {}, .fresh = a.common.force};
-    if (!a.common.out.empty()) {
-      make_directory(a.common);
-      how.events = a.common.out / "events.jsonl";
-      keep_existing(a.common, how.events, kEventsSchema);
-    }
-    return follow(STDIN_FILENO, std::move(detector), model, a.detector, reader, how);
-  }
-  if (a.heartbeat > 0.0) {
-    throw InputError("--heartbeat: expected --follow, which it is of");
-  }
-  if (a.log.empty()) {
-    throw InputError("detect: expected a LOG, or --follow to read rows from standard input");
-  }
-  if (a.layouts && a.series.empty()) {
-    throw InputError("--layouts: expected --series FILE, which they show");
+    return follow_input(a, model, std::move(detector), reader);
   }
   for (const std::filesystem::path& file : series_files(a, model)) {
-    keep_inputs(file, {a.log, a.model});
+    keep_inputs(file, a.common.read);
     keep_existing(a.common, file);
+    leave_standard_output(a.common, file);
   }
   make_directory(a.common, {"detection.json"});
   const auto opened = logs::open_log({a.log}, reader);

@@ -85,8 +85,9 @@ int run(const Arguments& a) {
   const std::string text = exporter::c_header(model, a.detector, false_alarms, options);
   std::string file;
   if (!a.common.out.empty()) {
-    make_directory(a.common);
     file = (a.common.out / (a.name + ".h")).string();
+    keep_inputs(file, a.common.read);
+    make_directory(a.common);
     keep_existing(a.common, file, fmt::format("/* {}.h: on-line fault detector.", a.name));
     files::atomic_write(file, text);
   }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include <wheelwright/files/bytes.hpp>
+#include <wheelwright/files/words.hpp>
 #include <wheelwright/report/fleet_report.hpp>
 #include <wheelwright/results/fleet_json.hpp>
 #include <wheelwright/results/fleet_logs.hpp>
@@ -77,6 +80,48 @@ results::StoredPlan plan_of(const Arguments& a, const std::optional<Robot>& flee
   plan.emplace_back("--map", maps);
   plan.emplace_back("--despite", fmt::format("{}", fmt::join(a.common.despite, " ")));
   return plan;
+}
+
+const std::vector<std::string> kWritten = {"fleet.json", "fleet.csv", "pooled_prior.yaml"};
+
+// Whether a robot of a directory of logs is nothing but --out, or a result of this command in it.
+bool is_result(const robots::FleetListRobot& robot, const Arguments& a) {
+  std::error_code neither;
+  std::vector<robots::FleetListLog> logs = robot.commission;
+  logs.insert(logs.end(), robot.checks.begin(), robot.checks.end());
+  const bool own = std::ranges::all_of(logs, [&](const robots::FleetListLog& log) {
+    return std::filesystem::equivalent(log.path.parent_path(), a.common.out, neither) &&
+           std::ranges::find(kWritten, log.path.filename().string()) != kWritten.end();
+  });
+  const bool out = std::filesystem::equivalent(a.list / robot.name, a.common.out, neither);
+  if (out && !own) {
+    throw InputError(fmt::format("--out {}: holds logs of the robot {}: expected another directory",
+                                 a.common.out.string(), files::shown(robot.name)));
+  }
+  if (own && !logs.empty() && !a.common.quiet && !launched_by_mpi()) {
+    tell("wheelwright fleet: {}: left out: a result of this command, no log\n", logs.front().path.string());
+  }
+  return own && (out || !logs.empty());
+}
+
+// The robots of LIST, without what an earlier run wrote among their logs. Throws InputError where a result would replace
+// a file of theirs.
+std::vector<robots::FleetListRobot> robots_of(const Arguments& a) {
+  std::vector<robots::FleetListRobot> robots = robots::read_fleet(a.list);
+  if (!a.common.out.empty() && std::filesystem::is_directory(a.list)) {
+    std::erase_if(robots, [&](const robots::FleetListRobot& robot) { return is_result(robot, a); });
+    if (robots.empty()) {
+      throw InputError(a.list.string() + ": no log and no directory with logs in it but --out: expected a robot");
+    }
+  }
+  std::vector<std::filesystem::path> read;
+  for (const robots::FleetListRobot& robot : robots) {
+    for (const robots::FileState& file : robots::states_of(robot)) {
+      read.push_back(file.path);
+    }
+  }
+  keep_inputs(a.common, kWritten, read);
+  return robots;
 }
 
 // Reads the records in the order of items: the fleet, and fleet.csv on the way.
@@ -194,8 +239,8 @@ study::RobotRecord record_of_changed(study::RobotLogs logs, const std::vector<st
 }
 
 int run(const Arguments& a) {
-  make_directory(a.common, {"fleet.json", "fleet.csv", "pooled_prior.yaml"}, lock_for(a.scale));
-  const std::vector<robots::FleetListRobot> robots = robots::read_fleet(a.list);
+  const std::vector<robots::FleetListRobot> robots = robots_of(a);
+  make_directory(a.common, kWritten, lock_for(a.scale));
   const std::optional<Robot> own = a.robot.empty() ? std::nullopt : std::optional(read_robot(a.robot));
   CommonOptions given = a.common;
   given.columns.clear();

@@ -165,8 +165,9 @@ std::string edited_name(const std::filesystem::path& source) {
   return source.stem().string() + std::string(kEdited) + source.extension().string();
 }
 
-// Names of the edited files that stand beside an earlier result.
-std::vector<std::string> earlier_simulators(const std::filesystem::path& result) {
+// Names of the edited files that stand beside an earlier result, and are not read now.
+std::vector<std::string> earlier_simulators(const CommonOptions& options) {
+  const std::filesystem::path result = options.out / "gap.json";
   std::vector<std::string> names;
   if (std::filesystem::is_regular_file(result)) {
     try {
@@ -174,7 +175,7 @@ std::vector<std::string> earlier_simulators(const std::filesystem::path& result)
       for (const Json& simulator : json.at("simulators")) {
         const Json& file = simulator.at("file");
         const std::filesystem::path edited = file.is_string() ? file.get<std::string>() : "";
-        if (edited.stem().string().ends_with(kEdited)) {
+        if (edited.stem().string().ends_with(kEdited) && !is_read(options.out / edited.filename(), options.read)) {
           names.push_back(edited.filename().string());
         }
       }
@@ -208,12 +209,6 @@ std::vector<SimulatorSource> simulator_sources(const Arguments& a, const Robot& 
       throw InputError(fmt::format("{}: {} is no robot on two driven wheels", option, a.robot.string()));
     }
     SimulatorSource source{format, path, files::read_bytes(path, kLongest)};
-    std::error_code none;
-    const std::filesystem::path target = a.common.out / edited_name(source.path);
-    if (std::filesystem::equivalent(path, target, none)) {
-      throw InputError(
-          fmt::format("{} {}: would be written over itself: expected another --out", option, path.string()));
-    }
     for (const SimulatorSource& other : sources) {
       if (edited_name(other.path) == edited_name(source.path)) {
         throw InputError(fmt::format("{} {}: {} has the same name: expected one file for each", option, path.string(),
@@ -296,7 +291,7 @@ int run(const Arguments& a) {
       written.push_back(edited_name(simulator));
     }
   }
-  const std::vector<std::string> earlier = earlier_simulators(a.common.out / "gap.json");
+  const std::vector<std::string> earlier = earlier_simulators(a.common);
   written.insert(written.end(), earlier.begin(), earlier.end());
   make_directory(a.common, written);
   Robot robot = read_robot(a.robot);

@@ -9,6 +9,7 @@
 #include <memory>
 #include <new>
 #include <sstream>
+#include <system_error>
 #include <thread>
 #include <vector>
 #ifdef __GLIBC__
@@ -24,6 +25,7 @@
 #include "command_tree.hpp"
 #include "commands.hpp"
 #include "common.hpp"
+#include "options.hpp"
 
 namespace {
 
@@ -70,6 +72,34 @@ void end_when_interrupted() {
   }).detach();
 }
 
+std::vector<std::pair<std::string, Run>> add_commands(CLI::App& program) {
+  return {{"try", add_try(program)},
+          {"commission", add_commission(program)},
+          {"detect", add_detect(program)},
+          {"doctor", add_doctor(program)},
+          {"check", add_check(program)},
+          {"compare", add_compare(program)},
+          {"identify", add_identify(program)},
+          {"margins", add_margins(program)},
+          {"sensitivity", add_sensitivity(program)},
+          {"export", add_export(program)},
+          {"design", add_design(program)},
+          {"simulate", add_simulate(program)},
+          {"choose", add_choose(program)},
+          {"gap", add_gap(program)},
+          {"fleet", add_fleet(program)},
+          {"convert", add_convert(program)},
+          {"robot", add_robot(program)},
+          {"completion", add_completion(program)},
+          {"man", add_man(program)}};
+}
+
+int without_thread(const std::system_error& error) {
+  tell_error(fmt::format("no thread can be started ({}): expected room for more of them: ulimit -u, or fewer --threads",
+                         error.code().message()));
+  return kBadInput;
+}
+
 int run(int argc, char** argv) {
   CLI::App program(
       "Model-based fault detection for wheeled robots, with thresholds that are derived, not tuned.\n"
@@ -83,31 +113,15 @@ int run(int argc, char** argv) {
       "Start with:  wheelwright try BAG --urdf robot.urdf, or wheelwright commission LOG --robot robot.yaml --out "
       "result\n"
       "Each command has its own --help.");
-  const std::vector<std::pair<std::string, Run>> commands = {{"try", add_try(program)},
-                                                             {"commission", add_commission(program)},
-                                                             {"detect", add_detect(program)},
-                                                             {"doctor", add_doctor(program)},
-                                                             {"check", add_check(program)},
-                                                             {"compare", add_compare(program)},
-                                                             {"identify", add_identify(program)},
-                                                             {"margins", add_margins(program)},
-                                                             {"sensitivity", add_sensitivity(program)},
-                                                             {"export", add_export(program)},
-                                                             {"design", add_design(program)},
-                                                             {"simulate", add_simulate(program)},
-                                                             {"choose", add_choose(program)},
-                                                             {"gap", add_gap(program)},
-                                                             {"fleet", add_fleet(program)},
-                                                             {"convert", add_convert(program)},
-                                                             {"robot", add_robot(program)},
-                                                             {"completion", add_completion(program)},
-                                                             {"man", add_man(program)}};
+  const std::vector<std::pair<std::string, Run>> commands = add_commands(program);
   program.failure_message([argc, argv, &program](const CLI::App*, const CLI::Error& error) {
     const std::string meant = suggestion(words_of(program), {argv + 1, argv + argc});
     return fmt::format("wheelwright: {}{}\nRun with --help for more information.\n", error.what(),
                        meant.empty() ? "" : "; " + meant);
   });
+  refuse_mistaken_values(program);
   try {
+    refuse_lost_values({argv + 1, argv + argc});
     program.parse(argc, argv);
     for (const auto& [name, run] : commands) {
       if (program.got_subcommand(name)) {
@@ -126,6 +140,8 @@ int run(int argc, char** argv) {
     tell_error(fmt::format("{}: {}: expected a file or directory that can be read and written", error.path1().string(),
                            error.code().message()));
     return kBadInput;
+  } catch (const std::system_error& error) {
+    return without_thread(error);
   } catch (const std::bad_alloc&) {
     tell("wheelwright: not enough memory for this input: expected a shorter log, fewer threads or a larger machine\n");
     return kInternal;
@@ -159,7 +175,12 @@ static void occupy_closed_streams() {
 int main(int argc, char** argv) {
   occupy_closed_streams();
   keep_freed_memory();
-  end_when_interrupted();
+  std::signal(SIGXFSZ, SIG_IGN);  // what is too large for a limit cannot be written: that is told
+  try {
+    end_when_interrupted();
+  } catch (const std::system_error& error) {
+    return finished(without_thread(error));
+  }
   const int code = run(argc, argv);
   discard_gathered();
   remove_empty_directories();

@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <thread>
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <wheelwright/core/error.hpp>
@@ -129,6 +132,55 @@ void add_scale_options(CLI::App& command, ScaleOptions& options) {
   command.add_flag("--merge", options.merge, "Take together what the shards in --out evaluated; evaluate nothing");
   command.add_flag("--fresh", options.fresh,
                    "Throw away what an earlier run left in --out, instead of going on with it");
+}
+
+namespace {
+
+std::string if_empty(const OptionWords& option, const std::string& value) {
+  if (!value.empty()) {
+    return {};
+  }
+  return std::string("is empty: expected ") + (option.takes_directory() ? "a directory"
+                                               : option.takes_file()    ? "a file"
+                                                                        : "a value");
+}
+
+std::string if_no_count(const std::string& value) {
+  std::uint64_t count = 0;
+  const char* const end = value.data() + value.size();
+  const auto read = std::from_chars(value.data(), end, count);
+  return read.ec == std::errc() && read.ptr == end
+             ? std::string()
+             : fmt::format("{}: expected a whole number from 0 to {}", files::shown(value),
+                           std::numeric_limits<std::uint64_t>::max());
+}
+
+}  // namespace
+
+void refuse_mistaken_values(CLI::App& program) {
+  for (CLI::App* command : program.get_subcommands([](CLI::App*) { return true; })) {
+    for (CLI::Option* option : command->get_options()) {
+      const OptionWords words = words_of(*option);
+      if (words.value.empty()) {
+        continue;
+      }
+      option->transform(CLI::Validator([words](std::string& value) { return if_empty(words, value); }, ""));
+      if (words.value == "N") {
+        option->check(if_no_count);
+      }
+    }
+  }
+}
+
+void refuse_lost_values(const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    if (word == "--") {
+      return;
+    }
+    if (word.size() > 3 && word.starts_with("--") && word.find('=') == word.size() - 1) {
+      throw CLI::ValidationError(word.substr(0, word.size() - 1), "is empty: expected a value");
+    }
+  }
 }
 
 CLI::Validator in_unit(const std::string& unit) {

@@ -9,6 +9,7 @@
 
 #include <wheelwright/detector/detector.hpp>
 
+#include "command_tree.hpp"
 #include "common.hpp"
 #include "run_items.hpp"
 
@@ -35,8 +36,9 @@ template <typename Arguments>
                          int (*run)(const Arguments&)) {
   add_common(command, arguments->common);
   add_footer(command, examples);
-  return [arguments, run](const std::string& command_line) {
+  return [arguments, run, &command](const std::string& command_line) {
     arguments->common.command_line = command_line;
+    arguments->common.read = files_read(command);
     if constexpr (requires { arguments->robot.native(); }) {
       take_columns(arguments->robot, arguments->common);
     }
@@ -65,6 +67,12 @@ void add_test(CLI::App& command, detector::Test& test);
 
 /// Makes an option take quantities with units: what the option itself converts is the number in `unit` (quantity()).
 [[nodiscard]] CLI::Validator in_unit(const std::string& unit);
+
+/// Makes all options of the commands of `program` refuse an empty value, as of a variable that is not set, and those that
+/// take a number N a sign and more than 64 bits.
+void refuse_mistaken_values(CLI::App& program);
+/// Throws CLI::ValidationError where one of `words` is --OPTION= without a value, whose value would be the next word.
+void refuse_lost_values(const std::vector<std::string>& words);
 
 /// Adds --shard I/N, --merge and --fresh.
 void add_scale_options(CLI::App& command, ScaleOptions& options);

@@ -63,8 +63,9 @@ int run(const Arguments& a) {
     throw InputError("--out-file and --out: two places for one file: expected one of them");
   }
   const std::filesystem::path target = a.common.out.empty() ? a.file : a.common.out / "robot.yaml";
-  keep_inputs(target, {a.urdf, a.ros2_control});
+  keep_inputs(target, a.common.read);
   keep_existing(a.common, target);
+  leave_standard_output(a.common, target);
   const robots::RobotWithOrigins robot = made(a);
   const std::string text = robots::robot_yaml(robot);
   static_cast<void>(robots::parse_robot(text, target.empty() ? "the robot file" : target.string()));

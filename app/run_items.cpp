@@ -3,12 +3,16 @@
 
 #include <algorithm>
 #include <charconv>
+#include <condition_variable>
 #include <cstdlib>
 #include <filesystem>
+#include <mutex>
 #include <regex>
 #include <set>
+#include <stop_token>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -55,6 +59,18 @@ void check_together(const CommonOptions& common, const ScaleOptions& scale) {
   }
   if ((scale.shard || scale.merge) && launched_by_mpi()) {
     throw InputError(fmt::format("{} under mpirun: expected one of them, both share the items out", given));
+  }
+}
+
+// Throws std::system_error where so many threads cannot be started: oneTBB ends the program then.
+void check_room_for(std::size_t threads) {
+  std::vector<std::jthread> all;
+  while (all.size() < threads) {
+    all.emplace_back([](const std::stop_token& stop) {
+      std::mutex own;
+      std::unique_lock lock(own);
+      std::condition_variable_any().wait(lock, stop, [] { return false; });
+    });
   }
 }
 
@@ -155,12 +171,16 @@ files::PathLock::Kind lock_for(const ScaleOptions& scale) {
 ItemsRun run_items(const ItemsToRun& items, const CommonOptions& common, const ScaleOptions& scale,
                    const std::function<void(std::size_t, std::size_t)>& progress) {
   check_together(common, scale);
+  if (common.threads > 1 && !scale.merge) {
+    check_room_for(static_cast<std::size_t>(common.threads));
+  }
   make_directory(common);
   results::StoredPlan plan = items.plan;
   plan.emplace_back("the program", results::software());
   const results::StoredItems stored{items.work.items, items.key, items.passing};
   const Opening opening = scale.fresh ? Opening::fresh : Opening::resume;
   const auto open = [&](const std::string& name) {
+    keep_inputs(common.out / name, common.read);
     return std::make_unique<results::SqliteResults>(common.out.empty() ? fs::path() : common.out / name, plan, stored,
                                                     opening);
   };

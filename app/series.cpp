@@ -16,6 +16,8 @@
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/words/text.hpp>
 
+#include "common.hpp"
+
 namespace wheelwright::app {
 namespace {
 
@@ -42,7 +44,7 @@ Series write(Series series, LogSource& log, Detector<Filter> detector, double or
   logs::LogWriteOptions how;
   how.time_origin = origin;
   how.columns_topic = series.topic;
-  const auto writer = logs::create_log(series.path, names, how);
+  const auto writer = create_output(series.path, names, how);
   LogBlock out;
   out.columns.resize(names.size());
   const auto flush = [&] {
@@ -135,12 +137,29 @@ std::string plotjuggler_plot(const std::string& title, const Interval& times, In
 
 }  // namespace
 
+namespace {
+
+// A name without its whole ending (.csv.gz), and the ending; of a directory its own name.
+std::pair<std::filesystem::path, std::string> split_ending(const std::filesystem::path& path) {
+  std::filesystem::path name = path.has_filename() ? path : path.parent_path();
+  std::string ending;
+  if (const auto packing = name.extension(); packing == ".gz" || packing == ".zst" || packing == ".zstd") {
+    ending = packing.string();
+    name.replace_extension();
+  }
+  ending.insert(0, name.extension().string());
+  return {name.replace_extension(), ending};
+}
+
+}  // namespace
+
 std::filesystem::path kinematic_series(const std::filesystem::path& path) {
-  return path.parent_path() / (path.stem().string() + "_kinematic" + path.extension().string());
+  const auto [stem, ending] = split_ending(path);
+  return stem.string() + "_kinematic" + ending;
 }
 
 std::vector<std::filesystem::path> layout_files(const std::filesystem::path& path) {
-  const std::string stem = (path.parent_path() / path.stem()).string();
+  const std::string stem = split_ending(path).first.string();
   return {stem + ".plotjuggler.xml", stem + ".foxglove.json"};
 }
 

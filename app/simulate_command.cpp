@@ -35,6 +35,7 @@ constexpr const char* kExamples =
 int run(const Arguments& a) {
   keep_inputs(a.common.out, {a.scenario});
   keep_existing(a.common, a.common.out);
+  leave_standard_output(a.common, a.common.out);
   Scenario scenario = read_scenario(a.scenario);
   if (a.seed) {
     scenario.seed = *a.seed;
