@@ -10,7 +10,6 @@
 #include <cstring>
 #include <fstream>
 #include <iostream>
-#include <iterator>
 #include <mutex>
 #include <system_error>
 #include <utility>
@@ -22,6 +21,7 @@
 
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
+#include <wheelwright/logs/bag_files.hpp>
 #include <wheelwright/logs/csv.hpp>
 #include <wheelwright/logs/recorded_log.hpp>
 #include <wheelwright/model/robot.hpp>
@@ -261,21 +261,21 @@ std::unique_ptr<logs::LogWriter> create_output(const std::filesystem::path& out,
 
 namespace {
 
-// Whether `path` is one of the files of the recording in `directory`: of those that its metadata.yaml names or, without
-// one, of all of a recording's kinds.
+// Whether `path` is one of the files of the recording in `directory`, or its metadata.yaml.
 bool is_of_recording(const std::filesystem::path& path, const std::filesystem::path& directory) {
   std::error_code none;
-  const std::filesystem::path parent = path.has_parent_path() ? path.parent_path() : ".";
-  if (!std::filesystem::is_directory(directory, none) || !std::filesystem::equivalent(parent, directory, none) ||
-      !std::filesystem::exists(path, none)) {
+  if (!std::filesystem::is_directory(directory, none) || !std::filesystem::exists(path, none)) {
     return false;
   }
-  const std::string name = path.filename().string();
-  if (std::ifstream metadata(directory / "metadata.yaml", std::ios::binary); metadata) {
-    const std::string text(std::istreambuf_iterator<char>(metadata), {});
-    return name == "metadata.yaml" || text.find(name) != std::string::npos;
+  try {
+    const logs::bag::Parts parts = logs::bag::parts_of(directory, true);
+    return std::filesystem::equivalent(path, parts.metadata, none) ||
+           std::ranges::any_of(parts.files, [&](const logs::bag::Part& part) {
+             return std::filesystem::equivalent(path, part.path, none);
+           });
+  } catch (const InputError&) {  // no recording
+    return false;
   }
-  return name.ends_with(".mcap") || name.ends_with(".db3") || name.ends_with(".zstd");
 }
 
 }  // namespace

@@ -142,10 +142,10 @@ void keep_inputs(const CommonOptions& options, const std::vector<std::string>& f
 
 /// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible, where a result would
 /// replace what the command line names to be read, and, unless --force is given, where something else would be replaced
-/// than the command's own earlier result. `files` are the names that
-/// it may write beside report.html: first the result, KIND.json of the schema wheelwright/KIND, by which it knows itself,
-/// then what else it writes, which is its own where it is not younger than that. Where there are any, `out` is locked
-/// until the program ends: InputError where another one writes results into it, unless both share it.
+/// than the command's own earlier result. `files` are the names that it may write beside report.html: first the result,
+/// KIND.json of the schema wheelwright/KIND, by which it knows itself, then what else it writes, which is its own where
+/// it is not younger than that. Where there are any, `out` is locked until the program ends: InputError where another one
+/// writes results into it, unless both share it.
 void make_directory(const CommonOptions& options, const std::vector<std::string>& files = {},
                     files::PathLock::Kind lock = files::PathLock::Kind::alone);
 /// The lock of `path`, which may have been removed (PathLock::gone()); InputError, calling it `shown`, where another run

@@ -93,17 +93,21 @@ BagClocks bag_clocks(const std::vector<TopicTimes>& topics) {
   return result;
 }
 
-namespace {
+std::string_view pose_of(std::string_view type) {
+  return type == "geometry_msgs/msg/PoseStamped"                                                    ? "pose"
+         : type == "geometry_msgs/msg/PoseWithCovarianceStamped" || type == "nav_msgs/msg/Odometry" ? "pose.pose"
+                                                                                                    : "";
+}
 
-constexpr std::string_view quaternion = "xyzw";
-
-std::vector<std::string> yaw_fields(const std::string& orientation) {
+std::vector<std::string> quaternion_fields(const std::string& orientation) {
   std::vector<std::string> fields;
-  for (const char c : quaternion) {
+  for (const char c : std::string_view("xyzw")) {
     fields.push_back(fmt::format("{}.{}", orientation, c));
   }
   return fields;
 }
+
+namespace {
 
 bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
 
@@ -196,7 +200,7 @@ class Chooser {
     check_element(*found, name, path);
     const std::vector<std::string> numbers = numeric_paths(*own.definition);
     if (yaw && std::ranges::find(numbers, path) == numbers.end()) {
-      take(*found, {name, yaw_fields(path.substr(0, path.size() - 4)), BagColumn::Rule::yaw, factor});
+      take(*found, {name, quaternion_fields(path.substr(0, path.size() - 4)), BagColumn::Rule::yaw, factor});
     } else {
       take(*found, {name, {path}, BagColumn::Rule::value, factor});
     }
@@ -231,21 +235,19 @@ class Chooser {
       return;
     }
     const std::string& type = own.type;
-    const bool pose = type.starts_with("geometry_msgs/msg/PoseStamped") ||
-                      type.starts_with("geometry_msgs/msg/PoseWithCovarianceStamped");
-    if ((pose || type == "sensor_msgs/msg/JointState") && is_wished(plain_name(own.name))) {
+    const std::string pose(pose_of(type));
+    const bool joints = type == "sensor_msgs/msg/JointState", odometry = type == "nav_msgs/msg/Odometry";
+    if ((joints || (!pose.empty() && !odometry)) && is_wished(plain_name(own.name))) {
       choice_.notes.push_back(fmt::format(
           "{} ({}) was not taken: by its name it is what was wished for, no measurement; --map NAME={}.FIELD "
           "takes it",
           own.name, type, own.name));
-    } else if (type == "sensor_msgs/msg/JointState") {
+    } else if (joints) {
       offer_joints(k);
-    } else if (type == "geometry_msgs/msg/PoseStamped") {
-      offer_pose(k, "pose", 1);
-    } else if (type == "geometry_msgs/msg/PoseWithCovarianceStamped") {
-      offer_pose(k, "pose.pose", 1);
-    } else if (type == "nav_msgs/msg/Odometry") {
+    } else if (odometry) {
       offer_odometry(k);
+    } else if (!pose.empty()) {
+      offer_pose(k, pose, 1);
     } else if (type == "sensor_msgs/msg/Imu") {
       offer_imu(k);
     } else if (!is_of_ros(type)) {
@@ -286,7 +288,7 @@ class Chooser {
     offer(k, "x", {pose + ".position.x"}, rank);
     offer(k, "y", {pose + ".position.y"}, rank);
     if (measures(k, "orientation")) {
-      offer(k, "theta", yaw_fields(pose + ".orientation"), rank, BagColumn::Rule::yaw);
+      offer(k, "theta", quaternion_fields(pose + ".orientation"), rank, BagColumn::Rule::yaw);
     } else {
       choice_.notes.push_back(
           fmt::format("{} has no orientation (a quaternion of zeros): there is no column theta of it", topic(k).name));
@@ -326,7 +328,7 @@ class Chooser {
     }
     const bool reference = contains(name, "truth") || contains(name, "mocap") || contains(name, "vicon") ||
                            contains(name, "optitrack") || contains(name, "slam");
-    offer_pose(k, "pose.pose", reference ? 1 : 2);
+    offer_pose(k, std::string(pose_of(topic(k).type)), reference ? 1 : 2);
   }
 
   void offer_joints(std::size_t k) {
@@ -429,19 +431,8 @@ class Chooser {
     if (!wheels) {
       return;
     }
-    std::map<std::size_t, const Offer*> left;
-    for (const Offer& offer : offers_) {
-      if (offer.other_joints) {
-        left.try_emplace(offer.topic, &offer);
-      }
-    }
-    for (const auto& [k, first] : left) {
-      const BagColumn& column = first->column;
-      choice_.notes.push_back(
-          fmt::format("{} is of other joints than wheels, by their names, and was left out: --map {}={}.{} takes it",
-                      topic(k).name, column.name, topic(k).name, column.fields.front()));
-    }
-    std::erase_if(offers_, [](const Offer& offer) { return offer.other_joints; });
+    const auto other = [](const Offer& offer) { return offer.other_joints; };
+    leave(other, other, "other joints than wheels, by their names");
   }
 
   /// Beside wheels a topic with one joint is a gripper, an arm, a camera: its rows are no reason to interpolate wheels.
@@ -452,25 +443,32 @@ class Chooser {
     if (options_.only || !wheels("_r") || !wheels("_l")) {
       return;
     }
-    std::map<std::size_t, const Offer*> left;
     const auto axis = [](const Offer& offer) {
       const std::string& name = offer.column.name;
       return name == "position" || name == "velocity" || name == "effort";
     };
+    const auto unused = [&](const Offer& offer) {
+      return axis(offer) && std::ranges::none_of(offers_, [&](const Offer& other) {
+               return other.topic == offer.topic && !axis(other);
+             });
+    };
+    leave(axis, unused, "one axis, by its name no wheel");
+  }
+
+  /// Takes back the offers that are `left`, and says so of each topic that has one which is `said`: it is of `what`.
+  template <typename Left, typename Said>
+  void leave(const Left& left, const Said& said, std::string_view what) {
+    std::map<std::size_t, const BagColumn*> first;
     for (const Offer& offer : offers_) {
-      const bool used =
-          std::ranges::any_of(offers_, [&](const Offer& other) { return other.topic == offer.topic && !axis(other); });
-      if (axis(offer) && !used) {
-        left.try_emplace(offer.topic, &offer);
+      if (said(offer)) {
+        first.try_emplace(offer.topic, &offer.column);
       }
     }
-    for (const auto& [k, first] : left) {
-      const BagColumn& column = first->column;
-      choice_.notes.push_back(
-          fmt::format("{} is of one axis, by its name no wheel, and was left out: --map {}={}.{} takes it",
-                      topic(k).name, column.name, topic(k).name, column.fields.front()));
+    for (const auto& [k, column] : first) {
+      choice_.notes.push_back(fmt::format("{} is of {}, and was left out: --map {}={}.{} takes it", topic(k).name, what,
+                                          column->name, topic(k).name, column->fields.front()));
     }
-    std::erase_if(offers_, axis);
+    std::erase_if(offers_, left);
   }
 
   void take_offers() {

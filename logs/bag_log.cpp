@@ -53,14 +53,6 @@ double yaw_of(const double* q) {
   return std::atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), q[3] * q[3] + q[0] * q[0] - q[1] * q[1] - q[2] * q[2]);
 }
 
-/// Where messages of a type of poses have their orientation; empty for other types.
-std::string_view orientation_of(std::string_view type) {
-  return type == "geometry_msgs/msg/PoseStamped" ? "pose.orientation"
-         : type == "geometry_msgs/msg/PoseWithCovarianceStamped" || type == "nav_msgs/msg/Odometry"
-             ? "pose.pose.orientation"
-             : "";
-}
-
 /// Adds the names of a message and the arrays that have numbers in it.
 void look_at(const BagTopic& topic, std::string_view data, BagTopicView& view) {
   const std::vector<std::string> names = read_names(*topic.definition, data).value_or(std::vector<std::string>{});
@@ -107,12 +99,11 @@ void look_at_imu(const BagTopic& topic, std::string_view data, BagTopicView& vie
 
 /// Adds that a pose has no orientation: its first quaternion is none.
 void look_at_pose(const BagTopic& topic, std::string_view data, BagTopicView& view) {
-  const std::string_view place = orientation_of(topic.type);
-  if (place.empty()) {
+  const std::string pose(pose_of(topic.type));
+  if (pose.empty()) {
     return;
   }
-  RosExtractor extractor(*topic.definition, {fmt::format("{}.x", place), fmt::format("{}.y", place),
-                                             fmt::format("{}.z", place), fmt::format("{}.w", place)});
+  RosExtractor extractor(*topic.definition, quaternion_fields(pose + ".orientation"));
   std::array<double, 4> q{};
   if (extractor.read(data, q) && std::isnan(yaw_of(q.data()))) {
     view.unmeasured.emplace_back("orientation");
@@ -225,10 +216,7 @@ class BagWalk final : public RowWalk {
     cleaner_.set_longest_step(longest_step);
     std::vector<AlignedStream> streams;
     for (std::size_t k = 0; k < plan.choice.sources.size(); ++k) {
-      add_reading(plan.choice.sources[k], plan.definitions[k], plan.clocks.clocks[k], streams);
-      if (!readings_.empty() && readings_.back().topic == plan.choice.sources[k].topic) {
-        readings_.back().filled = plan.filled[k];
-      }
+      add_reading(k, streams);
     }
     if (readings_.empty()) {
       throw InputError(plan.path.string() + ": none of the wanted columns is in it");
@@ -298,11 +286,13 @@ class BagWalk final : public RowWalk {
   }
 
  private:
-  void add_reading(const BagSource& source, const RosDefinition& definition, const TopicClock& clock,
-                   std::vector<AlignedStream>& streams) {
+  /// Of the plan's source `k`, where one of its columns is wanted.
+  void add_reading(std::size_t k, std::vector<AlignedStream>& streams) {
+    const BagSource& source = plan_.choice.sources[k];
     Reading reading;
     reading.topic = source.topic;
-    reading.clock = clock;
+    reading.clock = plan_.clocks.clocks[k];
+    reading.filled = plan_.filled[k];
     AlignedStream stream;
     std::vector<std::string> fields;
     for (const BagColumn& column : source.columns) {
@@ -322,9 +312,9 @@ class BagWalk final : public RowWalk {
       return;
     }
     stream.columns = reading.slots;
-    stream.longest_gap = longest_gap_of(clock.median_step);
-    stream.time_error = clock.jitter;
-    reading.extractor.emplace(definition, fields);
+    stream.longest_gap = longest_gap_of(reading.clock.median_step);
+    stream.time_error = reading.clock.jitter;
+    reading.extractor.emplace(plan_.definitions[k], fields);
     reading.longest_gap = static_cast<double>(stream.longest_gap) / static_cast<double>(one_second);
     reading.numbers.resize(fields.size());
     reading.values.resize(reading.columns.size());

@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <wheelwright/logs/bag.hpp>
@@ -64,6 +65,11 @@ struct BagColumn {
   [[nodiscard]] bool is_yaw() const { return rule == Rule::yaw; }
   bool operator==(const BagColumn&) const = default;
 };
+
+/// Where messages of `type` have their pose: "pose" or "pose.pose"; empty for a type without one.
+[[nodiscard]] std::string_view pose_of(std::string_view type);
+/// Paths of the x, y, z and w of the quaternion at `orientation`.
+[[nodiscard]] std::vector<std::string> quaternion_fields(const std::string& orientation);
 
 /// Columns that are read from one topic.
 struct BagSource {

@@ -388,7 +388,7 @@ std::string note_on_times(const CsvHeader& header, const CsvRowReader& rows, dou
   constexpr std::array<CountUnit, 1> days = {{{86400.0, "days, as a spreadsheet writes them"}}};
   const bool serial = t > 3e4 && t < 6e4;  // days since 1900, from 1982 on
   const CountUnit* unit = !rows.clock_unit().empty() ? nullptr
-                          : step > 1.0               ? unit_of_step(step, count_units)
+                          : step > longest_plausible ? unit_of_step(step, count_units)
                           : serial                   ? unit_of_step(step, days)
                                                      : nullptr;
   const std::string what = fmt::format("the median step is {:.4g} s: ", step);

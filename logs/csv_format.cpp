@@ -204,6 +204,11 @@ const LogColumn* column_of_field(const std::string& field) {
   return nullptr;
 }
 
+/// Whether field `k` is one of the columns that were found.
+bool is_taken(const CsvHeader& header, std::size_t k) {
+  return std::ranges::any_of(header.found, [&](const auto& found) { return found.second == k; });
+}
+
 bool is_wanted(const CsvOptions& options, const std::string& name) {
   return name == "t" || !options.only || std::ranges::find(*options.only, name) != options.only->end();
 }
@@ -231,7 +236,7 @@ std::string unit_note(const std::string& field, const Missing& missing) {
 /// Says of each field that is left and called like a column that is missing why it was not taken.
 void note_units(CsvHeader& header, const CsvOptions& options) {
   for (std::size_t k = 0; k < header.fields.size(); ++k) {
-    if (std::ranges::any_of(header.found, [&](const auto& found) { return found.second == k; })) {
+    if (is_taken(header, k)) {
       continue;
     }
     std::string note = unit_note(header.fields[k], [&](const std::string& name) {
@@ -246,10 +251,9 @@ void note_units(CsvHeader& header, const CsvOptions& options) {
 void recognise(CsvHeader& header, const CsvOptions& options, const std::string& place) {
   std::map<std::string, std::vector<std::size_t>> candidates;
   for (std::size_t k = 0; k < header.fields.size(); ++k) {
-    const bool taken =
-        std::any_of(header.found.begin(), header.found.end(), [&](const auto& f) { return f.second == k; });
     const LogColumn* column = column_of_field(header.fields[k]);
-    if (taken || column == nullptr || header.found.contains(column->name) || !is_wanted(options, column->name)) {
+    if (is_taken(header, k) || column == nullptr || header.found.contains(column->name) ||
+        !is_wanted(options, column->name)) {
       continue;
     }
     candidates[column->name].push_back(k);

@@ -26,8 +26,7 @@ constexpr double turn = 2.0 * std::numbers::pi;
 double WheelAngle::follow(double time, double angle, bool predict) {
   constexpr double slack = 1e-3;
   const double step = angle - before_, seconds = time - time_;
-  least_ = std::min(least_, angle);
-  most_ = std::max(most_, angle);
+  keep(time, angle);
   const bool known = predict && std::isfinite(rate_);
   const double expected = known ? rate_ * seconds : 0.0;
   double turns = -std::round(step / turn);
@@ -43,20 +42,22 @@ double WheelAngle::follow(double time, double angle, bool predict) {
   jumped_ = turns != 0.0;
   turns_ += turns;
   rate_ = (step + turns * turn) / seconds;
-  before_ = angle;
-  time_ = time;
   return angle + turns_ * turn;
 }
 
 double WheelAngle::begin(double time, double angle) {
-  least_ = std::min(least_, angle);
-  most_ = std::max(most_, angle);
+  keep(time, angle);
   rate_ = std::numeric_limits<double>::quiet_NaN();
   turns_ = 0.0;
   jumped_ = false;
+  return angle;
+}
+
+void WheelAngle::keep(double time, double angle) {
+  least_ = std::min(least_, angle);
+  most_ = std::max(most_, angle);
   before_ = angle;
   time_ = time;
-  return angle;
 }
 
 RowCleaner::RowCleaner(const std::vector<std::string>& names, LogReport* report) : names_{"t"}, report_(report) {

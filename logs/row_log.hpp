@@ -28,8 +28,8 @@ enum class RowOutcome {
 
 /// A wheel angle that may be wrapped, made continuous. It counts as wrapped from the first jump on that nothing else
 /// explains: by more than half a turn, while all values so far lie within one turn, and with the turn taken away within
-/// a quarter of a turn of where the last step leads. From then on every step is the one
-/// that is closest to the last, per second, or the shortest where none of them is within a quarter of a turn of it.
+/// a quarter of a turn of where the last step leads. From then on every step is the one that is closest to the
+/// last, per second, or the shortest where none of them is within a quarter of a turn of it.
 class WheelAngle {
  public:
   /// `angle` (rad) at `time` (s), later than the last one, with the turns that were undone. `predict` is false where so
@@ -43,6 +43,8 @@ class WheelAngle {
   [[nodiscard]] double time() const { return time_; }
 
  private:
+  void keep(double time, double angle);
+
   double time_ = std::numeric_limits<double>::quiet_NaN();
   double before_ = 0.0;  // as logged
   double turns_ = 0.0;   // to add
