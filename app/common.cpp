@@ -278,6 +278,14 @@ bool is_of_recording(const std::filesystem::path& path, const std::filesystem::p
   }
 }
 
+// Whether a file `path` that is not there yet would be read with the recording in `directory`.
+bool would_be_of_recording(const std::filesystem::path& path, const std::filesystem::path& directory) {
+  std::error_code none;
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  return !logs::bag::storage_ending(path).empty() && std::filesystem::is_directory(directory, none) &&
+         std::filesystem::equivalent(folder, directory, none);
+}
+
 }  // namespace
 
 bool is_read(const std::filesystem::path& path, const std::vector<std::filesystem::path>& read) {
@@ -290,6 +298,10 @@ bool is_read(const std::filesystem::path& path, const std::vector<std::filesyste
 void keep_inputs(const std::filesystem::path& out, const std::vector<std::filesystem::path>& read) {
   if (is_read(out, read)) {
     throw InputError(out.string() + ": is what is read: expected another name");
+  }
+  if (std::ranges::any_of(read, [&](const std::filesystem::path& each) { return would_be_of_recording(out, each); })) {
+    throw InputError(out.string() +
+                     ": would be one of the files of the recording that is read: expected another directory");
   }
 }
 

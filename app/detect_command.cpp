@@ -123,6 +123,10 @@ std::vector<std::filesystem::path> write_all_series(const Arguments& a, logs::Re
 // Options that do not go together.
 void check_together(const Arguments& a) {
   if (a.follow) {
+    if (!a.log.empty()) {
+      throw InputError("detect: " + a.log.string() +
+                       ": a LOG beside --follow, which reads standard input: expected one of them");
+    }
     if (!a.series.empty() || a.layouts) {
       throw InputError(std::string(a.layouts ? "--layouts" : "--series") +
                        ": expected a LOG instead of --follow, which tells events alone");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <memory>
+#include <vector>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -36,7 +37,9 @@ int run(const Arguments& a) {
   keep_inputs(a.common.out, {a.scenario});
   keep_existing(a.common, a.common.out);
   leave_standard_output(a.common, a.common.out);
-  Scenario scenario = read_scenario(a.scenario);
+  std::vector<std::filesystem::path> named;
+  Scenario scenario = read_scenario(a.scenario, &named);
+  keep_inputs(a.common.out, named);
   if (a.seed) {
     scenario.seed = *a.seed;
   }

@@ -388,6 +388,15 @@ void check_rest(const HealthView& view, const std::vector<Column>& columns, std:
 
 // Wheel angles that come back every turn.
 void check_wrapped(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& out) {
+  if (reader.jumps > 0) {
+    out.push_back(
+        about("signals.jumps", FindingSeverity::warning, "",
+              fmt::format("A wheel angle jumps as no wheel turns {} time{}: the log was cut there.", reader.jumps,
+                          reader.jumps == 1 ? "" : "s"),
+              "Where a counter is set back, no more is lost than the filter settles in. Where an angle is wrapped "
+              "at another value than 2π, or counts degrees, log speeds beside it, or angles that go on.",
+              static_cast<double>(reader.jumps), "1"));
+  }
   if (reader.unwrapped > 0) {
     out.push_back(
         about("signals.wrapped", FindingSeverity::notice, "",

@@ -16,6 +16,7 @@
 namespace wheelwright::doctor {
 namespace {
 
+constexpr double kGap = 5.0;      // median steps from which on the readers begin a segment
 constexpr double kMissing = 1.5;  // median steps from which on a sample is missing
 
 LogFinding about_time(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
@@ -120,6 +121,9 @@ void check_segments(const HealthView& view, double seconds, std::vector<LogFindi
     const double before = t[view.segments[s].first - 1], after = t[view.segments[s].first];
     if (after <= before) {
       ++resets;
+      continue;
+    }
+    if (after - before <= kGap * view.step) {  // the rows of another file, or of a wheel angle that was set back
       continue;
     }
     lost += after - before;

@@ -432,6 +432,10 @@ std::filesystem::path file_to_replace(const std::filesystem::path& place) {
   if (to.as_it_is) {
     throw InputError(place.string() + ": is a pipe or a device: expected a file, which can be written in any order");
   }
+  if (access(to.file.c_str(), W_OK) != 0 && errno == EACCES && std::filesystem::exists(to.file)) {
+    throw InputError(place.string() + ": cannot be replaced (" + std::strerror(EACCES) +
+                     "): expected a file that may be written, or a new name");
+  }
   return to.file;
 }
 

@@ -132,6 +132,9 @@ std::string json_text(const Json& value, int indent) {
 void write_json(const std::filesystem::path& path, const Json& value) { atomic_write(path, json_text(value) + "\n"); }
 
 Json parse_json(std::string_view text, const std::string& file) {
+  if (text.find('\0') != std::string_view::npos) {  // the end, to the library
+    throw InputError(file + ": binary data: expected JSON");
+  }
   try {
     DocumentBuilder builder(file);
     Json::sax_parse(text.begin(), text.end(), &builder);
@@ -146,6 +149,13 @@ Json parse_json(std::string_view text, const std::string& file) {
   } catch (const Json::exception& error) {
     throw InputError(fmt::format("{}: {}: expected JSON", file, error.what()));
   }
+}
+
+bool is_json_object(std::string_view text) {
+  constexpr std::string_view mark = "\xEF\xBB\xBF";
+  text.remove_prefix(text.starts_with(mark) ? mark.size() : 0);
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  return first != std::string_view::npos && text[first] == '{';
 }
 
 Json read_json(const std::filesystem::path& path) { return parse_json(read_bytes(path, longest_json), path.string()); }

@@ -33,6 +33,9 @@ void write_json(const std::filesystem::path& path, const Json& value);
 /// 200 levels.
 [[nodiscard]] Json parse_json(std::string_view text, const std::string& file);
 
+/// Whether `text` begins as a JSON object does, behind white space or a byte order mark.
+[[nodiscard]] bool is_json_object(std::string_view text);
+
 /// Reads the JSON file `path` (plain, gzip or zstd; up to 64 MiB). Throws InputError as open_bytes and parse_json do.
 [[nodiscard]] Json read_json(const std::filesystem::path& path);
 

@@ -46,7 +46,16 @@ YamlPlace YamlPlace::parse(std::string_view text, std::string file, bool lines) 
     const auto shared = std::make_shared<const std::string>(std::move(file));
     YAML::Node root;
     try {
-      root.reset(YAML::Load(std::string(text)));
+      const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(text));
+      const auto more = std::find_if(documents.begin() + (documents.empty() ? 0 : 1), documents.end(),
+                                     [](const YAML::Node& document) { return !document.IsNull(); });
+      if (more != documents.end()) {
+        YamlPlace(std::make_shared<const Node>(Node{*more, shared, lines}), "")
+            .say("another document: expected one, with all keys");
+      }
+      if (!documents.empty()) {
+        root.reset(documents.front());
+      }
     } catch (const YAML::Exception& error) {
       const std::string where =
           lines && !error.mark.is_null() ? fmt::format("{}:{}", *shared, error.mark.line + 1) : *shared;

@@ -101,6 +101,18 @@ std::string synced(int descriptor) {
   return fsync(descriptor) == 0 || errno == EINVAL || errno == ENOSYS ? "" : std::strerror(errno);
 }
 
+// Gives `part` the mode of the file `place` that it is to replace. Returns why that may not be replaced.
+std::string keep_mode(const fs::path& part, const fs::path& place) {
+  struct stat there {};
+  if (lstat(place.c_str(), &there) != 0 || !S_ISREG(there.st_mode)) {
+    return "";
+  }
+  if (faccessat(AT_FDCWD, place.c_str(), W_OK, AT_EACCESS) != 0) {
+    return std::strerror(errno);
+  }
+  return chmod(part.c_str(), there.st_mode & 07777U) == 0 || errno == EPERM ? "" : std::strerror(errno);
+}
+
 constexpr std::string_view part = ".wheelwright-part";
 
 // What killed programs left in a directory under other names of their results, which nobody may write again. Once for a
@@ -156,6 +168,9 @@ Temporary::~Temporary() {
 
 std::string Temporary::move_to(const fs::path& place) {
   const std::scoped_lock guard(living().mutex);
+  if (std::string why = keep_mode(path_, place); !why.empty()) {
+    return why;
+  }
   if (std::string why = synced(lock_); !why.empty()) {
     return why;
   }
@@ -207,6 +222,9 @@ std::string move_together(const fs::path& from, const fs::path& to, const std::v
   fs::create_directory(earlier, ignored);
   std::vector<std::string> done;
   const auto replace = [&](const std::string& name, bool by_nothing) {
+    if (const std::string kept = by_nothing ? "" : keep_mode(from / name, to / name); !kept.empty()) {
+      return (to / name).string() + ": cannot be written (" + kept + ")";
+    }
     const bool there = fs::exists(fs::symlink_status(to / name, ignored));
     std::error_code unkept;
     if (there) {

@@ -27,7 +27,8 @@ class Temporary {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
   /// Renames it, on disk with all that was written to it, to `place`, and brings the new name to disk: a power cut leaves
-  /// what was there or what is new, either whole. Returns why not, in words; empty where it did.
+  /// what was there or what is new, either whole. A file that is replaced hands on its mode; one that may not be written
+  /// is not replaced. Returns why not, in words; empty where it did.
   [[nodiscard]] std::string move_to(const std::filesystem::path& place);
 
  private:
@@ -66,6 +67,7 @@ class PathLock {
 /// Renames the files `names` of `from`, on disk, into the directory `to`, in order, and removes `gone` there before: what
 /// belongs together is there together. An interruption (remove_temporaries()) waits until it is done; where one cannot be
 /// renamed, those before it are undone, on file systems that know hard links; a run that is killed leaves the first ones.
+/// Modes are handed on as move_to() does.
 /// Returns why not, in words; empty where all are on disk. For files of one directory that lies in the other.
 [[nodiscard]] std::string move_together(const std::filesystem::path& from, const std::filesystem::path& to,
                                         const std::vector<std::string>& names,

@@ -30,7 +30,7 @@ inline void require_clean(const logs::RecordedLog& log, const LogTable& table) {
   require(report.rows == table.rows() && report.segments == table.segment_starts.size());
   require(report.rows_read == report.rows + report.empty.count + report.not_finite.count + report.uncovered.count +
                                   report.duplicates.count + report.truncated.count);
-  require(report.segments == report.files.size() + report.resets.count + report.gaps.count);
+  require(report.segments == report.files.size() + report.resets.count + report.gaps.count + report.jumps.count);
   require(std::isfinite(report.seconds) && report.seconds >= 0.0 && std::isfinite(report.median_step));
 }
 

@@ -237,7 +237,13 @@ class Chooser {
     const std::string& type = own.type;
     const std::string pose(pose_of(type));
     const bool joints = type == "sensor_msgs/msg/JointState", odometry = type == "nav_msgs/msg/Odometry";
-    if ((joints || (!pose.empty() && !odometry)) && is_wished(plain_name(own.name))) {
+    const std::string& unreadable = topics_[k].unreadable;
+    if (!unreadable.empty() && (!is_of_ros(type) ? !recognised_in(own.definition.get()).empty()
+                                                 : joints || !pose.empty() || type == "sensor_msgs/msg/Imu")) {
+      choice_.notes.push_back(
+          fmt::format("{} ({}) was not taken: its first messages cannot be read ({}); --map NAME={}.FIELD takes it",
+                      own.name, type, unreadable, own.name));
+    } else if ((joints || (!pose.empty() && !odometry)) && is_wished(plain_name(own.name))) {
       choice_.notes.push_back(fmt::format(
           "{} ({}) was not taken: by its name it is what was wished for, no measurement; --map NAME={}.FIELD "
           "takes it",

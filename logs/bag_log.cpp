@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <utility>
@@ -27,6 +28,8 @@ constexpr std::size_t first_messages = 2000;
 constexpr std::size_t looked_at = 20000;  ///< messages at least, for topics that a recording without index has
 
 constexpr std::int64_t longest_late = one_second;
+constexpr std::size_t longest_run = 5;     ///< messages that are late together
+constexpr std::size_t between_runs = 200;  ///< messages: a topic that is late more often than this has several clocks
 
 constexpr std::size_t then_every = 100;  ///< of the later messages of a topic that names its elements
 
@@ -115,6 +118,7 @@ void look_at_pose(const BagTopic& topic, std::string_view data, BagTopicView& vi
 std::vector<BagTopicView> view_topics(BagReader& bag) {
   constexpr std::size_t each = 50;
   std::map<std::size_t, BagTopicView> met;
+  std::map<std::size_t, RosExtractor> unread;
   std::map<std::size_t, std::size_t> counts;
   BagMessage message;
   std::size_t read = 0;
@@ -123,6 +127,11 @@ std::vector<BagTopicView> view_topics(BagReader& bag) {
     const BagTopic& topic = bag.topics()[message.topic];
     BagTopicView& view = met[message.topic];
     const std::size_t count = counts[message.topic]++;
+    if (topic.definition && (count == 0 || (count < each && !view.unreadable.empty()))) {
+      RosExtractor& any =
+          unread.try_emplace(message.topic, *topic.definition, std::vector<std::string>{}).first->second;
+      view.unreadable = any.read(message.data, {}) ? "" : any.error();
+    }
     if (topic.type == joint_state && topic.definition && (count < each || count % then_every == 0)) {
       look_at(topic, message.data, view);
     } else if (topic.definition && count == 0) {
@@ -200,6 +209,10 @@ struct Reading {
   std::size_t without = 0;      ///< messages that have none of the columns
   std::size_t late = 0;         ///< messages that came after later ones
   std::deque<Waiting> waiting;  ///< by their times
+  std::int64_t arrived = 0;     ///< time of the last message
+  std::size_t behind = 0;       ///< the last so many messages rise in time and are behind an earlier one
+  std::size_t run_from = 0;     ///< the first of these, as counted
+  std::size_t last_behind = 0;  ///< the last one that was late, as counted; 0 before the first
   std::string first_damage;
   std::vector<std::string> filled;     ///< arrays that were known to have numbers when columns were chosen
   std::vector<std::string> late_fill;  ///< in words, those that had some later
@@ -427,7 +440,8 @@ class BagWalk final : public RowWalk {
   }
 
   /// Keeps the values of a reading back until none that is up to longest_late earlier can come. A time that goes back
-  /// by more is another recording.
+  /// by more is another recording, and so is a run of messages behind an earlier one where none was late for long: the
+  /// clock was set back.
   void put_in_order(std::size_t k, std::int64_t time) {
     Reading& reading = readings_[k];
     std::deque<Waiting>& waiting = reading.waiting;
@@ -435,9 +449,38 @@ class BagWalk final : public RowWalk {
       release(k, std::numeric_limits<std::int64_t>::max());
     }
     const auto later = std::ranges::upper_bound(waiting, time, {}, [](const Waiting& message) { return message.time; });
-    reading.late += later != waiting.end() ? 1U : 0U;
+    const bool late = later != waiting.end();
+    reading.late += late ? 1U : 0U;
     waiting.insert(later, {time, reading.numbers, reading.messages});
+    follow_run(reading, time, late);
+    if (reading.behind == longest_run) {
+      begin_again(k);
+    }
     release(k, waiting.back().time - longest_late);
+  }
+
+  /// Counts the messages behind an earlier one that come one after another.
+  static void follow_run(Reading& reading, std::int64_t time, bool late) {
+    const bool goes_on = late && reading.behind > 0 && time > reading.arrived;
+    const bool begins =
+        late && !goes_on && (reading.last_behind == 0 || reading.messages > reading.last_behind + between_runs);
+    reading.behind = goes_on ? reading.behind + 1 : begins ? 1 : 0;
+    reading.run_from = begins ? reading.messages : reading.run_from;
+    reading.last_behind = late ? reading.messages : reading.last_behind;
+    reading.arrived = time;
+  }
+
+  /// Ends what came before the run that is behind it.
+  void begin_again(std::size_t k) {
+    Reading& reading = readings_[k];
+    const auto of_run = [&](const Waiting& message) { return message.message >= reading.run_from; };
+    std::deque<Waiting> run;
+    std::ranges::copy_if(reading.waiting, std::back_inserter(run), of_run);
+    std::erase_if(reading.waiting, of_run);
+    release(k, std::numeric_limits<std::int64_t>::max());
+    reading.late -= run.size();
+    reading.behind = 0;
+    reading.waiting = std::move(run);
   }
 
   void release(std::size_t k, std::int64_t until) {

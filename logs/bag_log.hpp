@@ -95,6 +95,7 @@ struct BagTopicView {
   /// What the first message says is not measured: "angular_velocity", "linear_acceleration" of an Imu, "orientation" of a
   /// pose.
   std::vector<std::string> unmeasured = {};
+  std::string unreadable = {};  ///< why none of the first messages could be read; empty where one could
 };
 
 /// Chooses columns. What `options.map` says goes first: NAME=TOPIC.PATH, e.g.
@@ -110,7 +111,8 @@ struct BagTopicView {
 ///   topic whose name says that it comes from the wheels is left out, since that is no independent measurement;
 /// - a topic of joints or poses whose name says that they are wished for (goal, target, command) is left out;
 /// - sensor_msgs/Imu gives gyro_z and accel_x, but for what it says it does not measure;
-/// - types of other packages than ROS's own give the columns that fields of theirs are named after.
+/// - types of other packages than ROS's own give the columns that fields of theirs are named after;
+/// - a topic whose first messages cannot be read is left out and reported.
 /// Where two topics could give a column it is left out and reported. The rows' times are those of the topic with the
 /// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields.
 [[nodiscard]] BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,

@@ -593,7 +593,7 @@ const LogReport& CsvRowParser::report() const { return impl_->report; }
 void CsvRowParser::begin_counts() {
   LogReport& r = impl_->report;
   for (Occurrences* of : {&r.empty, &r.not_finite, &r.uncovered, &r.duplicates, &r.truncated, &r.resets, &r.gaps,
-                          &r.wraps, &r.angle_wraps}) {
+                          &r.jumps, &r.wraps, &r.angle_wraps}) {
     *of = {};
   }
 }

@@ -296,6 +296,8 @@ std::vector<std::string> sentences(const LogReport& report) {
   say(report.resets, "new segment", "new segments", "where time goes backwards");
   say(report.gaps, "new segment", "new segments",
       fmt::format("at gaps longer than 5 x the median step of {:.6g} s", report.median_step));
+  say(report.jumps, "new segment", "new segments",
+      "where a wheel angle jumps as no wheel turns: it was set back, or is wrapped at another value than 2π");
   say(report.wraps, "jump", "jumps", "of theta by more than π undone, as of a heading in rad that is wrapped at 2π");
   say(report.angle_wraps, "jump", "jumps", "of a wheel angle by a whole turn undone: it was wrapped at 2π");
   for (const LogFileReport& file : report.files) {

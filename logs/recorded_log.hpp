@@ -94,6 +94,7 @@ struct LogReport {
   Occurrences truncated;     ///< last lines dropped that are cut off in the middle (at most one a file)
   Occurrences resets;        ///< segments begun because time went backwards
   Occurrences gaps;          ///< segments begun because a step is more than 5 × the median step
+  Occurrences jumps;         ///< segments begun because a wheel angle took a step that no wheel turns
   Occurrences wraps;         ///< jumps of `theta` by more than π that were unwrapped (no row is lost)
   Occurrences angle_wraps;   ///< jumps of a wheel angle by a turn that were unwrapped (no row is lost)
 

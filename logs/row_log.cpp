@@ -25,6 +25,7 @@ constexpr double turn = 2.0 * std::numbers::pi;
 
 double WheelAngle::follow(double time, double angle, bool predict) {
   constexpr double slack = 1e-3;
+  constexpr double most_change = 100.0;  // rad/s
   const double step = angle - before_, seconds = time - time_;
   keep(time, angle);
   const bool known = predict && std::isfinite(rate_);
@@ -40,6 +41,7 @@ double WheelAngle::follow(double time, double angle, bool predict) {
     turns = std::abs(step + nearest * turn - expected) < 0.25 * turn ? nearest : turns;
   }
   jumped_ = turns != 0.0;
+  broken_ = known && std::abs(step + turns * turn - expected) > std::max(0.5 * turn, most_change * seconds);
   turns_ += turns;
   rate_ = (step + turns * turn) / seconds;
   return angle + turns_ * turn;
@@ -49,7 +51,7 @@ double WheelAngle::begin(double time, double angle) {
   keep(time, angle);
   rate_ = std::numeric_limits<double>::quiet_NaN();
   turns_ = 0.0;
-  jumped_ = false;
+  jumped_ = broken_ = false;
   return angle;
 }
 
@@ -95,6 +97,13 @@ RowOutcome RowCleaner::place(std::span<double> row, std::size_t number) {
       starts = true;
     } else if (step > longest_step_) {
       count(&LogReport::gaps, number);
+      starts = true;
+    }
+  }
+  for (const auto& [index, wheel] : wheels_) {
+    WheelAngle next = wheel;
+    if (!starts && (next.follow(t, row[index]), next.broken())) {
+      count(&LogReport::jumps, number, names_[index]);
       starts = true;
     }
   }
@@ -152,7 +161,7 @@ void RowCleaner::count(Occurrences LogReport::*what, std::size_t number, std::st
   if (met.count++ == 0) {
     met.first = at(number) + (detail.empty() ? "" : fmt::format(", column {}", detail));
   }
-  const bool row_lost = what != &LogReport::resets && what != &LogReport::gaps;
+  const bool row_lost = what != &LogReport::resets && what != &LogReport::gaps && what != &LogReport::jumps;
   report_->rows_read += row_lost ? 1 : 0;
 }
 

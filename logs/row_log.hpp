@@ -39,6 +39,9 @@ class WheelAngle {
   double begin(double time, double angle);
   /// Whether a turn was undone by the last call of follow().
   [[nodiscard]] bool jumped() const { return jumped_; }
+  /// Whether the last call of follow() took a step that no wheel turns: more than half a turn, and 100 rad/s for each
+  /// second, away from where the one before leads. The angle was set back, or is wrapped at something else than a turn.
+  [[nodiscard]] bool broken() const { return broken_; }
   /// Time of the last value, s; NaN before the first.
   [[nodiscard]] double time() const { return time_; }
 
@@ -50,7 +53,7 @@ class WheelAngle {
   double turns_ = 0.0;   // to add
   double least_ = std::numeric_limits<double>::infinity(), most_ = -least_;
   double rate_ = std::numeric_limits<double>::quiet_NaN();  // of the last step, rad/s
-  bool wrapped_ = false, jumped_ = false;
+  bool wrapped_ = false, jumped_ = false, broken_ = false;
 };
 
 /// The cleaning of a log, row by row. A row is its time and the values of `names`.
@@ -69,7 +72,8 @@ class RowCleaner {
   [[nodiscard]] const std::vector<double>& limits() const { return limits_; }
 
   /// Decides by its time what a row is whose values are finite and within limits(), and unwraps its angles in place:
-  /// the heading wherever it jumps by more than π, a wheel angle (phi_r, phi_l) as WheelAngle does.
+  /// the heading wherever it jumps by more than π, a wheel angle (phi_r, phi_l) as WheelAngle does. One that is broken
+  /// begins a segment.
   RowOutcome place(std::span<double> row, std::size_t number);
 
   /// The same for any row: one that has a value which is not finite is dropped. Throws InputError, naming the column,
@@ -79,7 +83,7 @@ class RowCleaner {
   /// Time of the last row that was not dropped, s.
   [[nodiscard]] double t() const { return t_; }
 
-  /// Counts a row that is lost (or a segment that begins: LogReport::resets, gaps) for the reason `what`.
+  /// Counts a row that is lost (or a segment that begins: LogReport::resets, gaps, jumps) for the reason `what`.
   void count(Occurrences LogReport::*what, std::size_t number, std::string_view detail = {});
 
   /// Place of row `number`, for messages.

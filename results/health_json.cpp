@@ -34,6 +34,7 @@ doctor::ReaderCounts reader_counts(const logs::LogReport& report) {
           .incomplete = report.empty.count + report.not_finite.count,
           .duplicates = report.duplicates.count,
           .truncated = report.truncated.count,
+          .jumps = report.jumps.count,
           .unwrapped = report.angle_wraps.count};
 }
 

@@ -106,7 +106,8 @@ struct ScenarioReader {
   std::string_view text;
   const std::string& file;
   const std::filesystem::path& folder;
-  Scenario scenario;
+  std::vector<std::filesystem::path>* named = nullptr;
+  Scenario scenario = {};
   std::optional<std::filesystem::path> commands = {};
   std::optional<YamlPlace> effects = {};
 
@@ -149,9 +150,17 @@ struct ScenarioReader {
     }
   }
 
+  std::filesystem::path file_at(const YamlPlace& place, std::string_view expected) const {
+    std::filesystem::path out = folder / place.text(expected);
+    if (named != nullptr) {
+      named->push_back(out);
+    }
+    return out;
+  }
+
   void read_part(const std::string& key, const YamlPlace& place) {
     if (key == "robot") {
-      scenario.robot = place.is_scalar() ? read_robot(folder / place.text("a robot file, or its keys"))
+      scenario.robot = place.is_scalar() ? read_robot(file_at(place, "a robot file, or its keys"))
                                          : robots::parse_robot(robot_text(text, place), file);
     } else if (key == "parameters") {
       read_parameters(place);
@@ -229,7 +238,7 @@ struct ScenarioReader {
     sim::Trajectory& trajectory = scenario.trajectory;
     for (const auto& [name, value] : place.members({"kind", "speed", "yaw_rate", "period", "file"})) {
       if (name == "file") {
-        commands = folder / value.text("a CSV file with t, command_r, command_l");
+        commands = file_at(value, "a CSV file with t, command_r, command_l");
       } else if (name == "kind") {
         trajectory.kind = static_cast<sim::Trajectory::Kind>(value.choice(
             {"straight", "circle", "figure_eight", "multi_sine", "spin", "stops", "commissioning", "table"}));
@@ -331,14 +340,15 @@ struct ScenarioReader {
 
 }  // namespace
 
-Scenario parse_scenario(std::string_view text, const std::string& file, const std::filesystem::path& folder) {
-  ScenarioReader reader{text, file, folder, {}, {}, {}};
+Scenario parse_scenario(std::string_view text, const std::string& file, const std::filesystem::path& folder,
+                        std::vector<std::filesystem::path>* read) {
+  ScenarioReader reader{text, file, folder, read};
   reader.read();
   return reader.scenario;
 }
 
-Scenario read_scenario(const std::filesystem::path& path) {
-  return parse_scenario(files::read_bytes(path, longest_scenario), path.string(), path.parent_path());
+Scenario read_scenario(const std::filesystem::path& path, std::vector<std::filesystem::path>* read) {
+  return parse_scenario(files::read_bytes(path, longest_scenario), path.string(), path.parent_path(), read);
 }
 
 }  // namespace wheelwright::results

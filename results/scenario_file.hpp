@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <wheelwright/sim/simulation.hpp>
 
@@ -34,11 +35,14 @@ namespace wheelwright::results {
 ///
 /// Throws InputError, naming file, line, key, value and what was expected, for unknown or repeated keys, wrong types
 /// and impossible values; naming the file and the field where values do not go together.
-[[nodiscard]] Scenario read_scenario(const std::filesystem::path& path);
+/// `read` is given the files that it names, where it is not null.
+[[nodiscard]] Scenario read_scenario(const std::filesystem::path& path,
+                                     std::vector<std::filesystem::path>* read = nullptr);
 
 /// The same from text; `file` is for messages, and robot files and tables are looked for in `folder`.
 [[nodiscard]] Scenario parse_scenario(std::string_view text, const std::string& file,
-                                      const std::filesystem::path& folder = {});
+                                      const std::filesystem::path& folder = {},
+                                      std::vector<std::filesystem::path>* read = nullptr);
 
 }  // namespace wheelwright::results
 

@@ -381,7 +381,7 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
 
 OnlineModel read_model(const std::filesystem::path& path) {
   const std::string text = files::read_bytes(path, longest_model_file);
-  if (const std::size_t first = text.find_first_not_of(" \t\r\n"); first != std::string::npos && text[first] != '{') {
+  if (!text.empty() && !files::is_json_object(text)) {
     throw InputError(path.string() +
                      ": is no model.json: expected the file that `wheelwright commission` writes into --out (from a "
                      "robot file, --robot, and a log)");

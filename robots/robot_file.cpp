@@ -323,10 +323,9 @@ Robot read_robot(const std::filesystem::path& path) {
 
 ColumnMap read_columns(const std::filesystem::path& path, const std::vector<std::string>& names) {
   const std::string text = files::read_bytes(path, longest_model_file);
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
   std::optional<YamlPlace> columns;
   try {
-    if (first != std::string::npos && text[first] == '{') {
+    if (files::is_json_object(text)) {
       const Json robot = files::parse_json(text, path.string()).at("robot");
       if (robot.contains("columns")) {
         columns = YamlPlace::parse(files::json_text(robot["columns"], -1), path.string() + ": /robot/columns");

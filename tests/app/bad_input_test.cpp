@@ -217,6 +217,12 @@ TEST_F(BadInput, ModelFile) {
     EXPECT_THAT(message(other),
                 HasSubstr("model.json: is no model.json: expected the file that `wheelwright commission`"));
   }
+  for (const char* const mark : {"", "\xEF\xBB\xBF"}) {
+    EXPECT_THAT(message(mark + std::string(R"( {"schema": "wheelwright/model/1", "message": "says nothing"})")),
+                HasSubstr("model.json: holds no model: says nothing"));
+  }
+  EXPECT_THAT(message(std::string("{\"schema\": \"wheelwright/model/1\"}\n\0 {}", 38)),
+              HasSubstr("model.json: binary data: expected JSON"));
   EXPECT_THAT(message(R"({"schema": "wheelwright/gap/1"})"), HasSubstr("\"schema\": \"wheelwright/model/1\""));
   EXPECT_THAT(message(R"({"schema": "wheelwright/model/1", "message": "says nothing"})"),
               HasSubstr("model.json: holds no model: says nothing"));

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a run reads stays, what it is to write is written or refused, and standard output holds one thing.
+#include <unistd.h>
+
 #include <wheelwright/core/words.hpp>
 
 #include "app/program.hpp"
@@ -190,6 +192,71 @@ TEST_F(Outputs, AFleetDoesNotTakeItsOwnResultsForRobots) {
     EXPECT_THAT(again.err, HasSubstr(out + "/fleet.csv: left out: a result of this command"));
   }
   refuses("fleet logs --robot robot.yaml --out logs/bob", "--out logs/bob: holds logs of the robot 'bob'");
+}
+
+TEST_F(Outputs, NoLogIsPutIntoTheRecordingThatItComesFrom) {
+  put_log(500);
+  ASSERT_EQ(run("convert h.csv bag/ --quiet").code, 0);
+  const std::vector<std::string> before = names_in("bag");
+  refuses("convert bag bag/more.mcap", "bag/more.mcap: would be one of the files of the recording that is read");
+  refuses("convert bag/ ./bag/../bag/more.db3", "would be one of the files of the recording that is read");
+  EXPECT_EQ(names_in("bag"), before);
+  EXPECT_EQ(run("convert bag bag/table.csv --quiet").code, 0);
+}
+
+TEST_F(Outputs, ASimulationDoesNotReplaceWhatItsScenarioNames) {
+  put("table.csv", "t,command_r,command_l\n0,1,1\n1,2,1\n2,1,1\n");
+  put("s.yaml",
+      "robot: robot.yaml\nparameters: {mass: 21, yaw_inertia: 1, viscous_linear: 4, viscous_yaw: 1}\n"
+      "trajectory: {kind: table, file: table.csv}\n");
+  for (const std::string file : {"table.csv", "robot.yaml", "s.yaml"}) {
+    const std::string read = bytes(path(file));
+    refuses("simulate s.yaml --force --out ./" + file, file + ": is what is read: expected another name");
+    EXPECT_EQ(bytes(path(file)), read);
+  }
+  EXPECT_EQ(run("simulate s.yaml --out log.csv").code, 0);
+}
+
+TEST_F(Outputs, ALogBesideFollowIsRefused) {
+  commission_shipped();
+  put_log(500);
+  refuses("detect h.csv --follow --model model/model.json",
+          "h.csv: a LOG beside --follow, which reads standard input: expected one of them");
+}
+
+TEST_F(Outputs, WhatIsReplacedHandsOnItsMode) {
+  put_log(500);
+  const auto mode_of = [&](const std::string& file) { return fs::status(path(file)).permissions(); };
+  const std::string convert = "convert h.csv out.csv --force --quiet --out result";
+  ASSERT_EQ(run(convert).code, 0);
+  for (const fs::perms mode : {fs::perms(0600), fs::perms(0660), fs::perms(0644)}) {
+    for (const std::string file : {"out.csv", "result/convert.json"}) {
+      fs::permissions(path(file), mode);
+    }
+    ASSERT_EQ(run(convert).code, 0);
+    EXPECT_EQ(mode_of("out.csv"), mode);
+    EXPECT_EQ(mode_of("result/convert.json"), mode);
+  }
+}
+
+// By a user who may write into the directories and not into the files; as root the program is another user's.
+TEST_F(Outputs, WhatMayNotBeWrittenIsNotReplaced) {
+  put_log(500);
+  ASSERT_EQ(run("convert h.csv out.csv --quiet --out result").code, 0);
+  for (const std::string file : {"out.csv", "result/convert.json"}) {
+    fs::permissions(path(file), fs::perms(0444));
+  }
+  for (const std::string folder : {".", "result"}) {
+    fs::permissions(path(folder), fs::perms(0777));
+  }
+  const std::string other = geteuid() == 0 ? "setpriv --reuid 65534 --clear-groups" : "";
+  const std::string read = bytes(path("result/convert.json"));
+  refuses("convert h.csv out.csv --force", "out.csv: cannot be replaced (Permission denied)", other);
+  refuses("convert h.csv new.csv --force --out result", "result/convert.json: cannot be written (Permission denied)",
+          other);
+  EXPECT_EQ(bytes(path("result/convert.json")), read);
+  const Outcome done = run("convert h.csv other.csv --quiet", "/dev/null", other);
+  EXPECT_EQ(done.code, 0) << done.err;
 }
 
 TEST_F(Outputs, StandardOutputTakesALogAndNothingElse) {

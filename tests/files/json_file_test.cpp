@@ -84,6 +84,8 @@ TEST_F(JsonFile, TextThatIsNoJson) {
   EXPECT_THAT(input_error([&] { (void)parse_json("{\n  \"a\": 1,\n  b: 2\n}", "m.json"); }),
               AllOf(HasSubstr("m.json:3:3"), HasSubstr("expected JSON")));
   EXPECT_THAT(input_error([&] { (void)parse_json("{\"a\": 1", "m.json"); }), HasSubstr("m.json:1:"));
+  EXPECT_THAT(input_error([&] { (void)parse_json(std::string("{\"a\": 1}\0, 2", 13), "m.json"); }),
+              HasSubstr("m.json: binary data"));
   EXPECT_THAT(input_error([&] { (void)parse_json("{\"a\": 1e999}", "m.json"); }), HasSubstr("m.json"));
   EXPECT_THAT(input_error([&] { (void)parse_json(std::string(100000, '['), "m.json"); }), HasSubstr("nested"));
   EXPECT_THAT(input_error([&] { (void)read_json(path("absent.json")); }), HasSubstr("absent.json: no such file"));

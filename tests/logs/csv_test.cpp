@@ -352,6 +352,38 @@ TEST_F(Csv, WheelAnglesThatAreNotWrappedStayAsTheyAre) {
     ASSERT_EQ(table.column("phi_l")[k], 0.5 * static_cast<double>(k) - (k < 100 ? 0.0 : 50.0));
   }
   EXPECT_EQ(report.angle_wraps.count, 0u);
+  EXPECT_EQ(report.jumps.count, 1u);
+  EXPECT_THAT(report.jumps.first, HasSubstr("log.csv:102, column phi_l"));
+  EXPECT_THAT(table.segment_starts, ElementsAre(0u, 100u));
+}
+
+// Drives that wrap at ±12.5 rad or at two turns, degrees, and a counter that is set behind its first sample.
+TEST_F(Csv, AWheelAngleThatJumpsAsNoWheelTurnsBeginsASegment) {
+  const auto wrapped = [](double angle, double from, double period) {
+    return angle - period * std::floor((angle - from) / period);
+  };
+  const auto rows = [&](auto&& angle, double step = 0.01) {
+    std::string text = "t,phi_r,phi_l\n";
+    for (int k = 0; k < 400; ++k) {
+      text += fmt::format("{},{},{}\n", step * k, angle(step * k), 3.0 * step * k);
+    }
+    return read(text);
+  };
+  for (const auto& [from, period] : {std::pair{-12.5, 25.0}, std::pair{0.0, 8.0 * std::numbers::pi}}) {
+    const LogTable table = rows([&](double t) { return wrapped(-20.0 * t, from, period); });
+    EXPECT_EQ(report.jumps.count, table.segment_starts.size() - 1) << period;
+    EXPECT_GE(report.jumps.count, 3u) << period;
+    for (std::size_t k = 1; k < table.rows(); ++k) {
+      const bool starts = std::ranges::count(table.segment_starts, k) > 0;
+      ASSERT_EQ(starts, std::abs(table.column("phi_r")[k] - table.column("phi_r")[k - 1]) > 1.0) << k;
+    }
+  }
+  EXPECT_EQ(rows([&](double t) { return wrapped(900.0 * t, 0.0, 360.0); }).segment_starts.size(), 10u);
+  EXPECT_THAT(rows([](double t) { return t == 0.0 ? 500.0 : 2.0 * t; }).segment_starts, ElementsAre(0u, 2u));
+  // As rough as wheels get: from standstill to 60 rad/s within a sample of 20 Hz, and an encoder of four counts a turn.
+  EXPECT_EQ(rows([](double t) { return t < 5.0 ? 0.0 : 60.0 * (t - 5.0); }, 0.05).segment_starts.size(), 1u);
+  EXPECT_EQ(rows([](double t) { return 0.5 * std::numbers::pi * std::floor(7.0 * t); }, 0.001).segment_starts.size(),
+            1u);
 }
 
 TEST_F(Csv, MedianStepIsThatOfTheFirstSteps) {

@@ -24,8 +24,10 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::input_error;
+using ::testing::Not;
 using ::testing::UnorderedElementsAre;
 
 constexpr std::int64_t ms = 1'000'000;
@@ -149,6 +151,74 @@ TEST_F(RecordingsOfOthers, AClockThatIsSetBackChangesNoValue) {
   }
   bag.commit();
   EXPECT_EQ(read("a.mcap").column("omega_l"), sent);
+}
+
+// By half a second, as NTP does it: the two half seconds were woven into one.
+TEST_F(RecordingsOfOthers, AClockThatIsSetBackByLittleBeginsASegment) {
+  for (const int at : {40, 300}) {
+    BagWriter bag(path("a.mcap"));
+    const std::size_t topic = add(bag, "/joint_states", RosJointState::type);
+    RosJointState joint;
+    joint.name = {"left_wheel", "right_wheel"};
+    std::vector<double> sent;
+    for (int k = 0; k < 600; ++k) {
+      joint.header.stamp = (1000 + 10 * k - (k < at ? 0 : 305)) * ms;
+      joint.velocity = {1.0 + k, -1.0};
+      sent.push_back(joint.velocity[0]);
+      bag.write(topic, (1000 + 10 * k) * ms, encoder.encode(joint));
+    }
+    bag.commit();
+    const LogTable table = read("a.mcap");
+    EXPECT_EQ(table.column("omega_l"), sent) << at;
+    EXPECT_THAT(table.segment_starts, ElementsAre(0U, static_cast<std::size_t>(at)));
+    EXPECT_EQ(report.resets.count, 1U);
+    EXPECT_THAT(notes(), Not(Contains(HasSubstr("recorded after later ones"))));
+  }
+}
+
+// A slow publisher whose clock is ahead, and a fast one: their messages are in the order of their stamps, in one segment
+// but for what the first run of late ones looks like.
+TEST_F(RecordingsOfOthers, TwoClocksOfATopicAreNoClockThatIsSetBackAgainAndAgain) {
+  BagWriter bag(path("a.mcap"));
+  const std::size_t topic = add(bag, "/joint_states", RosJointState::type);
+  RosJointState joint;
+  joint.name = {"left_wheel", "right_wheel"};
+  for (int k = 0; k < 1000; ++k) {
+    for (const int ahead : {0, 75}) {
+      if (ahead == 0 || k % 10 == 0) {
+        joint.header.stamp = (1000 + 10 * k + ahead) * ms;
+        joint.velocity = {1e-9 * static_cast<double>(joint.header.stamp), 1.0};
+        bag.write(topic, (1001 + 10 * k) * ms, encoder.encode(joint));
+      }
+    }
+  }
+  bag.commit();
+  const LogTable table = read("a.mcap");
+  EXPECT_LE(table.segment_starts.size(), 3U);  // time goes back once, and before that has a gap
+  EXPECT_GE(table.rows(), 1090U);
+  for (std::size_t k = 100; k < table.rows(); ++k) {
+    ASSERT_NEAR(table.column("omega_l")[k], table.column("omega_l")[0] + table.t[k] - table.t[0], 1e-6);
+  }
+}
+
+// Every row was lost for want of the odometry, and nothing said that its encoding is why.
+TEST_F(RecordingsOfOthers, ATopicThatCannotBeReadIsLeftOutAndSaid) {
+  BagWriter bag(path("a.mcap"));
+  const std::size_t topic = add(bag, "/joint_states", RosJointState::type);
+  const std::size_t odometry = add(bag, "/odom", "nav_msgs/msg/Odometry");
+  joints(bag, topic, 10, 100, [](double t, RosJointState& joint) {
+    joint.name = {"left_wheel", "right_wheel"};
+    joint.velocity = {1.0 + t, 2.0};
+  });
+  for (int k = 0; k < 100; ++k) {
+    bag.write(odometry, 10 * (k + 1) * ms, std::string("\0\7\0\0", 4) + std::string(720, '\1'));  // XCDR2
+  }
+  bag.commit();
+  EXPECT_EQ(read("a.mcap").rows(), 100U);
+  EXPECT_THAT(notes(),
+              Contains(AllOf(HasSubstr("/odom (nav_msgs/msg/Odometry) was not taken: its first messages cannot be "
+                                       "read ("),
+                             HasSubstr("--map NAME=/odom.FIELD takes it"))));
 }
 
 TEST_F(RecordingsOfOthers, OtherMessagesOfATopicThatIsReadAreSaid) {

@@ -253,6 +253,17 @@ TEST(RobotFile, BadValuesElsewhere) {
   EXPECT_THAT(error("a: &x [*x]\nb: *y\n"), HasSubstr("expected YAML"));
 }
 
+TEST(RobotFile, HoldsOneDocument) {
+  const auto error = [](const std::string& text) {
+    return testing::input_error([&] { (void)parse_robot(text, "robot.yaml"); });
+  };
+  for (const std::string around : {"---\n", "%YAML 1.2\n---\n"}) {
+    EXPECT_EQ(to_json(parse_robot(around + least + "---\n# nothing\n", "f")), to_json(parse_robot(least, "f")));
+  }
+  EXPECT_THAT(error(least + "---\nfriction: anisotropic\n"), HasSubstr(": another document: expected one"));
+  EXPECT_THAT(error("wheel_radius: 0.1\n---\ntrack_width: 1\n"), HasSubstr("robot.yaml:3: another document"));
+}
+
 TEST(RobotFile, JsonObjectErrorsNameTheKey) {
   Json object = to_json(parse_robot(least, "f"));
   object["wheel_radius"] = "wide";
