@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <unordered_set>
 
 #include <fmt/format.h>
 #include <tinyxml2.h>
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <wheelwright/core/error.hpp>
@@ -35,6 +37,59 @@ struct YamlPlace::Node {
   }
 };
 
+namespace {
+
+/// What stands in a document: whether there is anything, and where it begins.
+class Contents final : public YAML::EventHandler {
+ public:
+  [[nodiscard]] bool empty() const { return empty_; }
+  [[nodiscard]] const YAML::Mark& begin() const { return begin_; }
+
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    begin_ = mark;
+    empty_ = true;
+  }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { meet(mark); }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t, const std::string&) override { meet(mark); }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    meet(mark);
+  }
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    meet(mark);
+  }
+  void OnMapEnd() override {}
+
+ private:
+  void meet(const YAML::Mark& mark) {
+    begin_ = empty_ ? mark : begin_;
+    empty_ = false;
+  }
+
+  YAML::Mark begin_ = YAML::Mark::null_mark();
+  bool empty_ = true;
+};
+
+/// Where something stands behind the first document, which YAML::Load() takes alone; none where there is nothing.
+YAML::Mark behind_first_document(std::string_view text) {
+  std::istringstream stream{std::string(text)};
+  YAML::Parser parser(stream);
+  Contents contents;
+  if (!parser.HandleNextDocument(contents)) {
+    return YAML::Mark::null_mark();
+  }
+  for (int before = -1; parser.HandleNextDocument(contents); before = contents.begin().pos) {
+    if (!contents.empty() || contents.begin().pos == before) {  // at the same place again: what no document begins with
+      return contents.begin();
+    }
+  }
+  return YAML::Mark::null_mark();
+}
+
+}  // namespace
+
 YamlPlace::YamlPlace(std::shared_ptr<const Node> node, std::string key)
     : node_(std::move(node)), key_(std::move(key)) {}
 
@@ -46,15 +101,10 @@ YamlPlace YamlPlace::parse(std::string_view text, std::string file, bool lines) 
     const auto shared = std::make_shared<const std::string>(std::move(file));
     YAML::Node root;
     try {
-      const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(text));
-      const auto more = std::find_if(documents.begin() + (documents.empty() ? 0 : 1), documents.end(),
-                                     [](const YAML::Node& document) { return !document.IsNull(); });
-      if (more != documents.end()) {
-        YamlPlace(std::make_shared<const Node>(Node{*more, shared, lines}), "")
-            .say("another document: expected one, with all keys");
-      }
-      if (!documents.empty()) {
-        root.reset(documents.front());
+      root.reset(YAML::Load(std::string(text)));
+      if (const YAML::Mark more = behind_first_document(text); !more.is_null()) {
+        throw InputError((lines ? fmt::format("{}:{}", *shared, more.line + 1) : *shared) +
+                         ": more than one document: expected one, with all keys");
       }
     } catch (const YAML::Exception& error) {
       const std::string where =

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -21,6 +19,7 @@
 #include <wheelwright/files/bytes.hpp>
 #include <wheelwright/files/words.hpp>
 #include <wheelwright/logs/bag_files.hpp>
+#include <wheelwright/logs/hdf5_attributes.hpp>
 #include <wheelwright/logs/hdf5_header.hpp>
 #include <wheelwright/logs/log_file.hpp>
 #include <wheelwright/logs/mcap_format.hpp>
@@ -29,7 +28,10 @@
 namespace wheelwright::logs {
 namespace {
 
+using hdf5::DatasetAttributes;
+using hdf5::format_defect;
 using hdf5::Handle;
+using hdf5::StoredAs;
 
 constexpr std::string_view signature("\x89HDF\r\n\x1a\n", 8);
 constexpr std::size_t rows_at_once = 8192;
@@ -39,9 +41,6 @@ constexpr hsize_t most_rows = hsize_t{1} << 32;
 constexpr hsize_t largest_chunk = hsize_t{1} << 25;  // bytes; the library holds a chunk of each column
 constexpr hsize_t cached_chunks = hsize_t{1} << 20;  // bytes that the library keeps unasked
 constexpr std::uint64_t always_pieces = std::uint64_t{1} << 16, bytes_a_piece = 8;
-constexpr hsize_t most_attributes = 1000;  // of a dataset, each of which has to be looked at
-constexpr hssize_t most_attribute_values = 64;
-constexpr std::size_t longest_attribute_text = 4096;
 
 /// Where the values of a dataset stand: in a line along one of at most two dimensions, of which the other has a size of
 /// 1, as MATLAB and column vectors have it.
@@ -54,20 +53,6 @@ struct ValueLine {
 
   [[nodiscard]] Place place(hsize_t row) const { return along == 0 ? Place{row, 0} : Place{0, row}; }
   [[nodiscard]] Place sides(hsize_t count) const { return along == 0 ? Place{count, 1} : Place{1, count}; }
-};
-
-/// What stored numbers mean by the attributes of netCDF's conventions (CF).
-struct StoredAs {
-  double scale = 1.0, offset = 0.0;
-  std::vector<double> missing{};  ///< stored numbers that stand for none
-
-  [[nodiscard]] bool plain() const { return scale == 1.0 && offset == 0.0 && missing.empty(); }
-  [[nodiscard]] double value(double stored) const {
-    if (std::ranges::find(missing, stored) != missing.end()) {
-      return std::numeric_limits<double>::quiet_NaN();
-    }
-    return offset == 0.0 ? scale * stored : scale * stored + offset;  // + 0 would take the sign of -0
-  }
 };
 
 /// One column that a file has: a dataset, or a member of one of a compound type.
@@ -90,14 +75,8 @@ struct Source {
   [[nodiscard]] std::string home() const { return member.empty() ? path.substr(0, path.rfind('/') + 1) : path; }
 };
 
-/// Before the first call: the library closes at exit what a failed write left open, and crashes there.
-void begin_library() {
-  H5dont_atexit();
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-}
-
 Handle open_file(const std::filesystem::path& path) {
-  begin_library();
+  hdf5::begin_library();
   Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!file) {
     throw InputError(path.string() +
@@ -109,175 +88,6 @@ Handle open_file(const std::filesystem::path& path) {
 bool is_number(hid_t type) {
   const H5T_class_t kind = H5Tget_class(type);
   return kind == H5T_INTEGER || kind == H5T_FLOAT || kind == H5T_ENUM;
-}
-
-/// Why the numbers of a type are not those that it seems to have: only formats that machines have are taken, since a
-/// header without a checksum gives each bit its meaning. Empty where nothing speaks against them.
-std::string format_defect(hid_t type) {
-  const std::size_t bits = 8 * H5Tget_size(type), precision = H5Tget_precision(type);
-  bool usual = H5Tget_offset(type) == 0;
-  if (H5Tget_class(type) == H5T_FLOAT) {
-    std::size_t sign = 0, exponent = 0, exponent_size = 0, mantissa = 0, mantissa_size = 0;
-    H5Tget_fields(type, &sign, &exponent, &exponent_size, &mantissa, &mantissa_size);
-    const bool extended = precision == 80 && mantissa_size == 64;  // x87: the first bit of the mantissa is stored
-    usual = usual && (extended || precision == bits) && mantissa == 0 && exponent == mantissa_size &&
-            sign == exponent + exponent_size && precision == sign + 1 && exponent_size < 16 &&
-            H5Tget_ebias(type) == (std::size_t{1} << exponent_size) / 2 - 1 &&
-            H5Tget_norm(type) == (extended ? H5T_NORM_NONE : H5T_NORM_IMPLIED);
-  } else if (H5Tget_class(type) == H5T_INTEGER) {
-    usual = usual && precision == bits;
-  }
-  return usual ? ""
-               : fmt::format(
-                     "has numbers of {} bits in a format that no machine has: the file is damaged, or its numbers "
-                     "take only some of their bits: expected whole integers or floats of IEEE 754",
-                     bits);
-}
-
-/// One attribute, opened.
-struct OpenAttribute {
-  hid_t id, type;
-  hssize_t count;  ///< of its values
-};
-
-/// The text of an attribute, of which all strings are equal, without blanks at its ends; nothing where it is none.
-std::optional<std::string> text_of(const OpenAttribute& attribute) {
-  if (H5Tget_class(attribute.type) != H5T_STRING || attribute.count > most_attribute_values) {
-    return std::nullopt;
-  }
-  const auto count = static_cast<std::size_t>(attribute.count);
-  std::vector<std::string> texts(std::max<std::size_t>(count, 1));
-  const std::size_t size = H5Tget_size(attribute.type);
-  if (H5Tis_variable_str(attribute.type) > 0) {
-    std::vector<char*> read(texts.size(), nullptr);
-    if (count > 0 && H5Aread(attribute.id, attribute.type, static_cast<void*>(read.data())) < 0) {
-      return std::nullopt;
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-      texts[k] = read[k] == nullptr ? "" : read[k];
-      H5free_memory(read[k]);
-    }
-  } else {
-    std::string read(size <= longest_attribute_text ? size * texts.size() : 0, '\0');
-    if (read.empty() || (count > 0 && H5Aread(attribute.id, attribute.type, read.data()) < 0)) {
-      return std::nullopt;
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-      texts[k] = read.substr(k * size, size);
-      texts[k] = texts[k].substr(0, texts[k].find('\0'));
-    }
-  }
-  if (std::ranges::count(texts, texts.front()) != std::ssize(texts)) {
-    return std::nullopt;
-  }
-  const std::size_t begin = texts.front().find_first_not_of(" \t\r\n"), end = texts.front().find_last_not_of(" \t\r\n");
-  return begin == std::string::npos ? "" : texts.front().substr(begin, end - begin + 1);
-}
-
-/// The numbers of an attribute; none where it holds something else, or too many.
-std::vector<double> numbers_of(const OpenAttribute& attribute) {
-  const H5T_class_t kind = H5Tget_class(attribute.type);
-  if ((kind != H5T_INTEGER && kind != H5T_FLOAT) || attribute.count > most_attribute_values ||
-      !format_defect(attribute.type).empty()) {
-    return {};
-  }
-  std::vector<double> numbers(static_cast<std::size_t>(attribute.count));
-  const bool read = numbers.empty() || H5Aread(attribute.id, H5T_NATIVE_DOUBLE, numbers.data()) >= 0;
-  return read ? numbers : std::vector<double>{};
-}
-
-/// What an attribute holds, for a message.
-std::string attribute_shown(const OpenAttribute& attribute) {
-  std::vector<std::string> words;
-  for (const double number : numbers_of(attribute)) {
-    words.push_back(fmt::format("{:g}", number));
-  }
-  if (!words.empty()) {
-    return core::listed(words);
-  }
-  const std::optional<std::string> text = text_of(attribute);
-  return text ? files::shown(*text) : fmt::format("of {} values of another kind", attribute.count);
-}
-
-/// What the attributes of a dataset say.
-struct DatasetAttributes {
-  std::string unit{};
-  bool clear_unit = true;  ///< false where there are several, or something else than a text
-  StoredAs stored{};
-  std::string defect{};  ///< why the values cannot be told by them
-
-  void add(const std::string& name, const OpenAttribute& attribute, hid_t values) {
-    const std::string plain = plain_name(name);
-    if (plain == "units" || plain == "unit") {
-      const std::optional<std::string> text = text_of(attribute);
-      clear_unit = clear_unit && text && (unit.empty() || text->empty() || unit == *text);
-      unit = unit.empty() ? text.value_or("") : unit;
-      return;
-    }
-    const std::vector<double> numbers = numbers_of(attribute);
-    const bool scaling = plain == "scale_factor" || plain == "add_offset";
-    if (numbers.empty() || (scaling && (numbers.size() > 1 || !std::isfinite(numbers.front())))) {
-      defect = fmt::format("has attribute {} {}: expected {}", files::shown(name), attribute_shown(attribute),
-                           scaling ? "one finite number" : "numbers");
-    } else if (scaling) {
-      (plain == "scale_factor" ? stored.scale : stored.offset) = numbers.front();
-    } else {
-      for (const double number : numbers) {
-        stored.missing.push_back(as_stored(number, values));
-      }
-    }
-  }
-
- private:
-  /// A float that is stored in fewer bits differs from a number of an attribute that has more.
-  static double as_stored(double number, hid_t values) {
-    std::array<double, 4> room{number};
-    if (H5Tget_class(values) == H5T_FLOAT && H5Tget_size(values) <= sizeof(room) && format_defect(values).empty()) {
-      H5Tconvert(H5T_NATIVE_DOUBLE, values, 1, room.data(), nullptr, H5P_DEFAULT);
-      H5Tconvert(values, H5T_NATIVE_DOUBLE, 1, room.data(), nullptr, H5P_DEFAULT);
-    }
-    return room.front();
-  }
-};
-
-/// What the attributes of a dataset say of its `values`. Nothing where they are damaged: the library must not be asked
-/// about them again, since it then reads what it has freed. Nor may it go through damaged ones, since it then gives back
-/// what it does not have: looking for a name that none can have meets the damage first, and in the library's own order it
-/// makes no table of those that stand outside of the header.
-std::optional<DatasetAttributes> attributes_of(hid_t dataset, hid_t values) {
-  static const std::string longer_than_any(std::size_t{1} << 16, 'x');
-  DatasetAttributes all;
-  H5O_info_t info{};
-  if (H5Aexists(dataset, longer_than_any.c_str()) < 0 || H5Oget_info2(dataset, &info, H5O_INFO_NUM_ATTRS) < 0) {
-    return std::nullopt;
-  }
-  if (info.num_attrs > most_attributes) {
-    all.defect = fmt::format("has {} attributes: expected at most {}", info.num_attrs, most_attributes);
-    return all;
-  }
-  std::vector<std::string> names;
-  const auto visit = [](hid_t, const char* name, const H5A_info_t*, void* to) -> herr_t {
-    constexpr std::array<std::string_view, 6> known{"units",      "unit",      "scale_factor",
-                                                    "add_offset", "fillvalue", "missing_value"};
-    if (std::ranges::find(known, plain_name(name)) != known.end()) {
-      static_cast<std::vector<std::string>*>(to)->emplace_back(name);
-    }
-    return 0;
-  };
-  if (H5Aiterate2(dataset, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, visit, &names) < 0) {
-    return std::nullopt;
-  }
-  for (const std::string& name : names) {
-    const Handle attribute(H5Aopen(dataset, name.c_str(), H5P_DEFAULT), H5Aclose);
-    const Handle type(attribute ? H5Aget_type(attribute.get()) : -1, H5Tclose);
-    const Handle space(attribute ? H5Aget_space(attribute.get()) : -1, H5Sclose);
-    const hssize_t count = space ? H5Sget_simple_extent_npoints(space.get()) : -1;
-    if (!type || count < 0) {
-      return std::nullopt;
-    }
-    all.add(name, {attribute.get(), type.get(), count}, values);
-  }
-  return all;
 }
 
 /// Bytes of the file.
@@ -481,7 +291,7 @@ void list_dataset(hid_t file, const std::string& path, const std::string& defect
     list_members(source, type.get(), sources);
     return;
   }
-  const std::optional<DatasetAttributes> attributes = attributes_of(dataset.get(), type.get());
+  const std::optional<DatasetAttributes> attributes = hdf5::attributes_of(dataset.get(), type.get());
   source.refused = either(attributes ? format_defect(type.get()) : "has damaged attributes", source.refused);
   if (attributes) {
     source.refused = either(source.refused, attributes->defect);
@@ -657,6 +467,7 @@ class DatasetChooser {
     check_size();
     say_unlike(home);
     say_elsewhere(home);
+    refuse_time_alone();
     return std::move(choice_);
   }
 
@@ -837,6 +648,20 @@ class DatasetChooser {
     }
   }
 
+  /// Throws InputError where there are other values than times and none is known: nothing would be read.
+  void refuse_time_alone() const {
+    if (choice_.found.size() > 1 || sources_.size() == 1 || options_.only) {
+      return;
+    }
+    std::string why;
+    for (const std::string& note : choice_.notes) {
+      why += "; " + note;
+    }
+    throw InputError(
+        fmt::format("{}: no column but the time is known: the file has {}: expected one of {}, or --map NAME=DATASET{}",
+                    path_, core::listed(choice_.header), core::listed(log_column_names()), why));
+  }
+
   void say_left_out(const LogColumn& column, const Source& source, const std::string& why) {
     const bool mendable = of_these_rows(source) && !source.remedy.empty();
     choice_.notes.push_back(fmt::format(
@@ -1004,109 +829,6 @@ bool is_hdf5(const std::filesystem::path& path) {
 
 std::unique_ptr<RowFile> hdf5_file(const std::filesystem::path& path, const LogOptions& options) {
   return std::make_unique<Hdf5File>(path, options);
-}
-
-namespace {
-
-using hdf5::Handle;
-
-constexpr hsize_t chunk_rows = 8192;
-constexpr unsigned packing_level = 4;
-
-class Hdf5Writer final : public LogWriter {
- public:
-  Hdf5Writer(std::filesystem::path path, std::vector<std::string> names) : beside_(std::move(path)) {
-    begin_library();
-    file_ = Handle(H5Fcreate(beside_.path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
-    const Handle group(file_ ? H5Gcreate2(file_.get(), "log", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT) : -1, H5Gclose);
-    if (!group) {
-      fail();
-    }
-    names.insert(names.begin(), "t");
-    for (const std::string& name : names) {
-      add(group.get(), name);
-    }
-  }
-
-  void write(const LogBlock& block) override {
-    check_block(block, datasets_.size() - 1);
-    if (block.rows() == 0) {
-      return;
-    }
-    append(datasets_.front().get(), block.t);
-    for (std::size_t c = 0; c < block.columns.size(); ++c) {
-      append(datasets_[c + 1].get(), block.columns[c]);
-    }
-    rows_ += block.rows();
-  }
-
-  void commit() override {
-    datasets_.clear();
-    if (H5Fflush(file_.get(), H5F_SCOPE_LOCAL) < 0) {
-      fail();
-    }
-    file_ = Handle();
-    beside_.put();
-  }
-
- private:
-  [[noreturn]] void fail() {
-    throw InputError(beside_.place().string() +
-                     ": cannot be written: the disk is full, or no HDF5 file can be made there");
-  }
-
-  void add(hid_t group, const std::string& name) {
-    const hsize_t none = 0, unlimited = H5S_UNLIMITED;
-    const Handle space(H5Screate_simple(1, &none, &unlimited), H5Sclose);
-    const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-    H5Pset_chunk(layout.get(), 1, &chunk_rows);
-    H5Pset_shuffle(layout.get());
-    H5Pset_deflate(layout.get(), packing_level);
-    H5Pset_obj_track_times(layout.get(), false);  // equal logs make equal files, whenever they are written
-    Handle dataset(H5Dcreate2(group, name.c_str(), H5T_IEEE_F64LE, space.get(), H5P_DEFAULT, layout.get(), H5P_DEFAULT),
-                   H5Dclose);
-    if (!dataset) {
-      fail();
-    }
-    if (const LogColumn* column = find_log_column(name); column != nullptr) {
-      const std::string unit(column->unit);
-      const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
-      H5Tset_size(type.get(), unit.size());
-      H5Tset_cset(type.get(), H5T_CSET_UTF8);
-      const Handle one(H5Screate(H5S_SCALAR), H5Sclose);
-      const Handle attribute(H5Acreate2(dataset.get(), "units", type.get(), one.get(), H5P_DEFAULT, H5P_DEFAULT),
-                             H5Aclose);
-      if (!attribute || H5Awrite(attribute.get(), type.get(), unit.data()) < 0) {
-        fail();
-      }
-    }
-    datasets_.push_back(std::move(dataset));
-  }
-
-  void append(hid_t dataset, const std::vector<double>& values) {
-    const hsize_t count = values.size(), all = rows_ + count;
-    const Handle memory(H5Screate_simple(1, &count, nullptr), H5Sclose);
-    if (H5Dset_extent(dataset, &all) < 0) {
-      fail();
-    }
-    const Handle space(H5Dget_space(dataset), H5Sclose);
-    if (H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, &rows_, nullptr, &count, nullptr) < 0 ||
-        H5Dwrite(dataset, H5T_NATIVE_DOUBLE, memory.get(), space.get(), H5P_DEFAULT, values.data()) < 0) {
-      fail();
-    }
-  }
-
-  files::FileBeside beside_;  // removed last, when the file is closed
-  Handle file_;
-  std::vector<Handle> datasets_;  ///< time, then the columns
-  hsize_t rows_ = 0;
-};
-
-}  // namespace
-
-std::unique_ptr<LogWriter> create_hdf5(const std::filesystem::path& path, const std::vector<std::string>& names) {
-  check_column_names(names);
-  return std::make_unique<Hdf5Writer>(path, names);
 }
 
 }  // namespace wheelwright::logs

@@ -46,6 +46,12 @@ class Handle {
   herr_t (*close_)(hid_t) = nullptr;
 };
 
+/// Before the first call: the library closes at exit what a failed write left open, and crashes there.
+inline void begin_library() {
+  H5dont_atexit();
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
 }  // namespace wheelwright::logs::hdf5
 
 namespace wheelwright::logs {

@@ -370,7 +370,7 @@ TEST_F(Csv, AWheelAngleThatJumpsAsNoWheelTurnsBeginsASegment) {
     return read(text);
   };
   for (const auto& [from, period] : {std::pair{-12.5, 25.0}, std::pair{0.0, 8.0 * std::numbers::pi}}) {
-    const LogTable table = rows([&](double t) { return wrapped(-20.0 * t, from, period); });
+    const LogTable table = rows([&](double t) { return wrapped(-20.0 * t - 1.0, from, period); });
     EXPECT_EQ(report.jumps.count, table.segment_starts.size() - 1) << period;
     EXPECT_GE(report.jumps.count, 3u) << period;
     for (std::size_t k = 1; k < table.rows(); ++k) {

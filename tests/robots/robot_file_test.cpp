@@ -258,10 +258,16 @@ TEST(RobotFile, HoldsOneDocument) {
     return testing::input_error([&] { (void)parse_robot(text, "robot.yaml"); });
   };
   for (const std::string around : {"---\n", "%YAML 1.2\n---\n"}) {
-    EXPECT_EQ(to_json(parse_robot(around + least + "---\n# nothing\n", "f")), to_json(parse_robot(least, "f")));
+    EXPECT_EQ(to_json(parse_robot(around + least + "---\n# nothing\n...\n", "f")), to_json(parse_robot(least, "f")));
   }
-  EXPECT_THAT(error(least + "---\nfriction: anisotropic\n"), HasSubstr(": another document: expected one"));
-  EXPECT_THAT(error("wheel_radius: 0.1\n---\ntrack_width: 1\n"), HasSubstr("robot.yaml:3: another document"));
+  EXPECT_THAT(error(least + "---\nfriction: anisotropic\n"),
+              HasSubstr("robot.yaml:5: more than one document: expected one"));
+  for (const std::string behind : {"]", "}", "] ]", "...\nfriction: anisotropic"}) {
+    EXPECT_THAT(error("{model: differential_drive, wheel_radius: 0.1, track_width: 0.5}\n" + behind + "\n"),
+                HasSubstr("expected"))
+        << behind;
+  }
+  EXPECT_THAT(error("wheel_radius: 0.1\n---\ntrack_width: 1\n"), HasSubstr("robot.yaml:3: more than one document"));
 }
 
 TEST(RobotFile, JsonObjectErrorsNameTheKey) {
