@@ -653,13 +653,15 @@ class DatasetChooser {
     if (choice_.found.size() > 1 || sources_.size() == 1 || options_.only) {
       return;
     }
+    std::vector<std::string> known = log_column_names();
+    std::erase(known, "t");
     std::string why;
     for (const std::string& note : choice_.notes) {
       why += "; " + note;
     }
     throw InputError(
         fmt::format("{}: no column but the time is known: the file has {}: expected one of {}, or --map NAME=DATASET{}",
-                    path_, core::listed(choice_.header), core::listed(log_column_names()), why));
+                    path_, core::listed(choice_.header), core::listed(known), why));
   }
 
   void say_left_out(const LogColumn& column, const Source& source, const std::string& why) {
