@@ -230,6 +230,11 @@ class Editor {
     TreeInertial wish = body;
     wish.mass = mass;
     wish.centre = axle_.middle + height * axle_.up + after;
+    if (!std::isfinite(about) || !wish.centre.allFinite()) {
+      out_.not_expressed.push_back(
+          {reasons, body_->place.text() + " has its mass so far away that its moments are no numbers", wanted});
+      return;
+    }
     if (about >= moment) {
       wish.tensor += (about - moment) * Eigen::Matrix3d::Identity();
     } else if (about > 0.0) {
