@@ -44,8 +44,10 @@ double WheelAngle::follow(double time, double angle, bool predict) {
   broken_ = known && std::abs(step + turns * turn - expected) > std::max(0.5 * turn, most_change * seconds);
   turns_ += turns;
   rate_ = (step + turns * turn) / seconds;
-  return angle + turns_ * turn;
+  return value();
 }
+
+double WheelAngle::value() const { return before_ + turns_ * turn; }
 
 double WheelAngle::begin(double time, double angle) {
   keep(time, angle);
@@ -100,10 +102,10 @@ RowOutcome RowCleaner::place(std::span<double> row, std::size_t number) {
       starts = true;
     }
   }
-  for (const auto& [index, wheel] : wheels_) {
-    WheelAngle next = wheel;
-    if (!starts && (next.follow(t, row[index]), next.broken())) {
-      count(&LogReport::jumps, number, names_[index]);
+  for (auto wheel = wheels_.begin(); !starts && wheel != wheels_.end(); ++wheel) {
+    wheel->second.follow(t, row[wheel->first]);
+    if (wheel->second.broken()) {
+      count(&LogReport::jumps, number, names_[wheel->first]);
       starts = true;
     }
   }
@@ -117,7 +119,7 @@ RowOutcome RowCleaner::place(std::span<double> row, std::size_t number) {
     unwrap(row[theta_], starts, number);
   }
   for (auto& [index, wheel] : wheels_) {
-    row[index] = starts ? wheel.begin(t, row[index]) : wheel.follow(t, row[index]);
+    row[index] = starts ? wheel.begin(t, row[index]) : wheel.value();
     if (wheel.jumped() && report_ != nullptr && report_->angle_wraps.count++ == 0) {
       report_->angle_wraps.first = at(number) + ", column " + names_[index];
     }

@@ -42,6 +42,8 @@ class WheelAngle {
   /// Whether the last call of follow() took a step that no wheel turns: more than half a turn, and 100 rad/s for each
   /// second, away from where the one before leads. The angle was set back, or is wrapped at something else than a turn.
   [[nodiscard]] bool broken() const { return broken_; }
+  /// What the last call returned.
+  [[nodiscard]] double value() const;
   /// Time of the last value, s; NaN before the first.
   [[nodiscard]] double time() const { return time_; }
 

@@ -57,6 +57,22 @@ class RecordingsOfOthers : public testing::ScratchTest {
       bag.write(topic, joint.header.stamp, encoder.encode(joint));
     }
   }
+  // a.mcap: joints every 10 ms, stamped `stamp` ms; the speeds of the left wheel.
+  std::vector<double> send(int count, const std::function<int(int)>& stamp) {
+    BagWriter bag(path("a.mcap"));
+    const std::size_t topic = add(bag, "/joint_states", RosJointState::type);
+    RosJointState joint;
+    joint.name = {"left_wheel", "right_wheel"};
+    std::vector<double> sent;
+    for (int k = 0; k < count; ++k) {
+      joint.header.stamp = stamp(k) * ms;
+      joint.velocity = {1.0 + k, -1.0};
+      sent.push_back(joint.velocity[0]);
+      bag.write(topic, (10 * k + 1) * ms, encoder.encode(joint));
+    }
+    bag.commit();
+    return sent;
+  }
 
   RosEncoder encoder;
   LogReport report;
@@ -138,36 +154,14 @@ TEST_F(RecordingsOfOthers, AHeadingOfAnOwnTypeGoesTheShortWayRound) {
 
 // Found by the second reader while this was written: a message before which others were let go had their numbers.
 TEST_F(RecordingsOfOthers, AClockThatIsSetBackChangesNoValue) {
-  BagWriter bag(path("a.mcap"));
-  const std::size_t topic = add(bag, "/joint_states", RosJointState::type);
-  RosJointState joint;
-  joint.name = {"left_wheel", "right_wheel"};
-  std::vector<double> sent;
-  for (int k = 0; k < 60; ++k) {
-    joint.header.stamp = (k < 30 ? 100'000 + 10 * k : 10 * k) * ms;
-    joint.velocity = {1.0 + k, -1.0};
-    sent.push_back(joint.velocity[0]);
-    bag.write(topic, (10 * k + 1) * ms, encoder.encode(joint));
-  }
-  bag.commit();
+  const std::vector<double> sent = send(60, [](int k) { return k < 30 ? 100'000 + 10 * k : 10 * k; });
   EXPECT_EQ(read("a.mcap").column("omega_l"), sent);
 }
 
 // By half a second, as NTP does it: the two half seconds were woven into one.
 TEST_F(RecordingsOfOthers, AClockThatIsSetBackByLittleBeginsASegment) {
   for (const int at : {40, 300}) {
-    BagWriter bag(path("a.mcap"));
-    const std::size_t topic = add(bag, "/joint_states", RosJointState::type);
-    RosJointState joint;
-    joint.name = {"left_wheel", "right_wheel"};
-    std::vector<double> sent;
-    for (int k = 0; k < 600; ++k) {
-      joint.header.stamp = (1000 + 10 * k - (k < at ? 0 : 305)) * ms;
-      joint.velocity = {1.0 + k, -1.0};
-      sent.push_back(joint.velocity[0]);
-      bag.write(topic, (1000 + 10 * k) * ms, encoder.encode(joint));
-    }
-    bag.commit();
+    const std::vector<double> sent = send(600, [&](int k) { return 1000 + 10 * k - (k < at ? 0 : 305); });
     const LogTable table = read("a.mcap");
     EXPECT_EQ(table.column("omega_l"), sent) << at;
     EXPECT_THAT(table.segment_starts, ElementsAre(0U, static_cast<std::size_t>(at)));
