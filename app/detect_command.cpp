@@ -68,7 +68,7 @@ double undecided_share(const Detection& detection, const OnlineModel& model, con
 // Why the log as a whole is not decided; empty where it is: all but what the filter settles in, or half of it.
 std::string why_not_decided(const Detection& detection, const OnlineModel& model, const logs::RecordedLog& log) {
   const logs::LogReport& report = log.report();
-  if (detection.instants == 0) {
+  if (detection.instants == 0 || commission::hardly_goes_on(log.median_step(), model.measurement.nominal_step)) {
     return why_undecided(model, report.rows, log.median_step());
   }
   const double settling = model.filter.settle / (model.filter.beta * log.median_step());

@@ -196,7 +196,6 @@ class Watch {
       sample_[c] = row.columns[pick_[c]][0];
     }
     const Decision& decision = detector_.step(row.t[0], sample_);
-    decisions_ += decision.valid ? 1 : 0;
     for (std::size_t i = 0; decision.valid && i < decision.channels.size(); ++i) {
       const detector::ChannelDecision& c = decision.channels[i];
       if (recorder_.add(i, number, row.t[0], c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm)) {
@@ -210,8 +209,6 @@ class Watch {
     return decision.valid;
   }
   [[nodiscard]] bool any() const { return !recorder_.events().empty(); }
-  /// Rows at which a decision was made.
-  [[nodiscard]] std::size_t decisions() const { return decisions_; }
 
  private:
   AnyDetector detector_;
@@ -219,7 +216,6 @@ class Watch {
   OnlineModel model_;
   std::vector<double> sample_;
   detector::EventRecorder recorder_;
-  std::size_t decisions_ = 0;
 };
 
 // Times in which no row comes.
@@ -295,9 +291,17 @@ class Blindness {
     if (watch_.spell().rows == 0) {
       parser_.begin_counts();
       unreadable_ = {};
+      crawling_ = 0;
     }
   }
+  /// A row with a decision at `t`.
   void decided(double t) {
+    if (watch_.crawls(t)) {
+      ++crawling_;
+      undecided(t);
+      return;
+    }
+    ++decisions_;
     if (const auto spell = watch_.decided(t)) {
       tell(*spell, t);
     }
@@ -312,6 +316,8 @@ class Blindness {
     undecided(std::nullopt);
   }
   [[nodiscard]] bool blind() const { return watch_.blind(); }
+  /// Rows at which something was decided.
+  [[nodiscard]] std::size_t decisions() const { return decisions_; }
   [[nodiscard]] std::string line() const { return blind_line(watch_.spell(), std::nullopt, why()); }
 
  private:
@@ -322,6 +328,9 @@ class Blindness {
     if (unreadable_.count > 0) {
       causes.push_back(fmt::format("{} line{} could not be read (first {})", unreadable_.count,
                                    unreadable_.count == 1 ? "" : "s", unreadable_.first));
+    }
+    if (crawling_ > 0) {
+      causes.push_back(crawling_words(model_, crawling_));
     }
     return why_blind(model_, causes);
   }
@@ -338,6 +347,8 @@ class Blindness {
   Teller& tell_;
   commission::BlindWatch watch_;
   logs::Occurrences unreadable_;
+  std::size_t crawling_ = 0;  // rows of the spell by whose clock hardly any time goes by
+  std::size_t decisions_ = 0;
 };
 
 }  // namespace
@@ -423,12 +434,12 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
           return {{"watching",
                    {{"t", t},
                     {"rows", number},
-                    {"decided", torque.decisions()},
+                    {"decided", blindness.decisions()},
                     {"blind", blindness.blind()},
                     {"incident", open}}}};
         },
         [&] {
-          return fmt::format("watching at {:.6g} s: {} rows, {} decided{}{}", t, number, torque.decisions(),
+          return fmt::format("watching at {:.6g} s: {} rows, {} decided{}{}", t, number, blindness.decisions(),
                              blindness.blind() ? ", blind" : "", open ? ", an incident is open" : "");
         });
   };
@@ -500,7 +511,7 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
       !pose_at_risk.watch().events.empty()) {
     return kNo;
   }
-  if (torque.decisions() == 0) {
+  if (blindness.decisions() == 0) {
     tell("wheelwright detect: {}\n", why_undecided(model, number, core::median_step(times)));
     return kBadInput;
   }
@@ -509,8 +520,8 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
     return kBadInput;
   }
   const double settling = model.filter.settle / (model.filter.beta * model.measurement.nominal_step);
-  if (static_cast<double>(torque.decisions()) + settling < 0.5 * static_cast<double>(lines)) {
-    tell("wheelwright detect: standard input: {}\n", why_mostly_undecided(torque.decisions(), lines, {}));
+  if (static_cast<double>(blindness.decisions()) + settling < 0.5 * static_cast<double>(lines)) {
+    tell("wheelwright detect: standard input: {}\n", why_mostly_undecided(blindness.decisions(), lines, {}));
     return kBadInput;
   }
   return kDone;

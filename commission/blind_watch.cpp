@@ -12,8 +12,11 @@ namespace {
 
 constexpr double kOfSettling = 1.5;
 constexpr double kFewestRows = 20.0;
+constexpr double kShareOfAStep = 0.01;
 
 }  // namespace
+
+bool hardly_goes_on(double step, double nominal) { return step < kShareOfAStep * nominal; }
 
 BlindWatch::BlindWatch(double step, double settling)
     : step_(step), longest_(std::max(kOfSettling * settling, kFewestRows * step)) {
@@ -21,7 +24,10 @@ BlindWatch::BlindWatch(double step, double settling)
   check::non_negative(settling, "settling");
 }
 
+bool BlindWatch::crawls(double t) const { return last_ && t >= *last_ && hardly_goes_on(t - *last_, step_); }
+
 std::optional<BlindSpell> BlindWatch::decided(double t) {
+  last_ = t;
   const BlindSpell ended = std::exchange(spell_, {.since = t});
   first_.reset();
   return std::exchange(told_, false) ? std::optional(ended) : std::nullopt;
@@ -32,6 +38,7 @@ std::optional<BlindSpell> BlindWatch::undecided(std::optional<double> t) {
   first_ = first_ ? first_ : t;
   spell_.seconds = std::max(spell_.seconds, step_ * static_cast<double>(spell_.rows));
   if (t) {
+    last_ = t;
     spell_.seconds = std::max(spell_.seconds, std::abs(*t - *first_));
   }
   if (told_ || !(spell_.seconds > longest_)) {

@@ -126,7 +126,7 @@ class DocumentBuilder final : public nlohmann::json_sax<Json> {
 }  // namespace
 
 std::string json_text(const Json& value, int indent) {
-  return value.dump(indent, ' ', false, Json::error_handler_t::replace);
+  return printable_json(value.dump(indent, ' ', false, Json::error_handler_t::replace));
 }
 
 void write_json(const std::filesystem::path& path, const Json& value) { atomic_write(path, json_text(value) + "\n"); }

@@ -22,7 +22,7 @@ namespace wheelwright::files {
 using Json = nlohmann::ordered_json;
 
 /// `value` as text: numbers are the shortest that read back exactly, NaN and ±infinity become null, bytes that are no
-/// UTF-8 become U+FFFD. `indent` blanks a level; −1 puts all on one line.
+/// UTF-8 become U+FFFD, and what a terminal obeys is "\\u009b". `indent` blanks a level; −1 puts all on one line.
 [[nodiscard]] std::string json_text(const Json& value, int indent = 2);
 
 /// Writes json_text(value) and a line end to `path`, whole or not at all. Throws InputError as AtomicFile does.

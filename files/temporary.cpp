@@ -86,9 +86,11 @@ int made(const fs::path& path, Temporary::Kind kind) {
   if (descriptor < 0) {
     return -1;
   }
-  holds_lock(descriptor, directory);  // not on every file system: then nobody can tell that this one is dead
+  // Not on every file system: then nobody can tell that this one is dead.
+  const bool taken = !holds_lock(descriptor, directory) && (errno == EWOULDBLOCK || errno == EACCES);
   struct stat here {};
-  if (fstat(descriptor, &here) == 0 && here.st_nlink == 0) {  // somebody was faster, and took it for a dead one
+  if (taken ||
+      (fstat(descriptor, &here) == 0 && here.st_nlink == 0)) {  // somebody was faster, and took it for a dead one
     close(descriptor);
     errno = EEXIST;
     return -1;
@@ -117,9 +119,9 @@ constexpr std::string_view part = ".wheelwright-part";
 
 // What killed programs left in a directory under other names of their results, which nobody may write again. Once for a
 // directory: it may hold much.
-void bury_parts(const fs::path& stem, bool directory) {
-  static std::set<std::pair<fs::path, bool>> done;
-  if (!stem.filename().native().ends_with(part) || !done.emplace(stem.parent_path(), directory).second) {
+void bury_parts(const fs::path& stem) {
+  static std::set<fs::path> done;
+  if (!stem.filename().native().ends_with(part) || !done.insert(stem.parent_path()).second) {
     return;
   }
   std::error_code error;
@@ -130,7 +132,8 @@ void bury_parts(const fs::path& stem, bool directory) {
     const std::size_t digits = name.find_last_not_of("0123456789") + 1;
     if (digits < name.size() && std::string_view(name).substr(0, digits).ends_with(part) &&
         !living().paths.contains(entry->path())) {
-      bury(entry->path(), directory);
+      std::error_code gone;
+      bury(entry->path(), entry->symlink_status(gone).type() == fs::file_type::directory);
     }
   }
 }
@@ -139,7 +142,7 @@ void bury_parts(const fs::path& stem, bool directory) {
 
 Temporary::Temporary(const fs::path& stem, Kind kind, const std::string& shown, const std::string& expected) {
   const std::scoped_lock guard(living().mutex);
-  bury_parts(stem, kind != Kind::file);
+  bury_parts(stem);
   for (int number = 0, tries = 0; number < most_numbers && lock_ < 0 && tries < 2 * most_numbers; ++tries) {
     path_ = stem;
     path_ += std::to_string(number);

@@ -256,6 +256,40 @@ std::string one_line(std::string_view text) {
   return shown_bytes(text, [](std::uint32_t c) { return c == '\n' || c == '\t' || is_command(c); });
 }
 
+bool has_commands(std::string_view text) {
+  while (!text.empty()) {
+    const auto [size, number] = first_character(text);
+    if (size > 0 && is_command(number)) {
+      return true;
+    }
+    text.remove_prefix(std::max<std::size_t>(size, 1));
+  }
+  return false;
+}
+
+std::string printable_json(std::string_view json) {
+  std::string out;
+  out.reserve(json.size());
+  const auto is_plain = [](char c) { return static_cast<unsigned char>(c) < 0x7F; };
+  while (!json.empty()) {
+    const auto plain = static_cast<std::size_t>(std::ranges::find_if_not(json, is_plain) - json.begin());
+    out += json.substr(0, plain);
+    json.remove_prefix(plain);
+    if (json.empty()) {
+      break;
+    }
+    const auto [size, number] = first_character(json);
+    const std::size_t taken = std::max<std::size_t>(size, 1);
+    if (size > 0 && is_command(number)) {
+      out += fmt::format("\\u{:04x}", number);
+    } else {
+      out += json.substr(0, taken);
+    }
+    json.remove_prefix(taken);
+  }
+  return out;
+}
+
 std::string valid_utf8(std::string_view text) {
   std::string out;
   out.reserve(text.size());

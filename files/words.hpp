@@ -74,6 +74,12 @@ template <typename Value, std::size_t n>
 /// printable() without line ends and tabs, which are "\\x0A" and "\\x09": names from files, where a line holds one.
 [[nodiscard]] std::string one_line(std::string_view text);
 
+/// Whether there is a character in `text` that printable() would not show as it is, bytes that are no UTF-8 apart.
+[[nodiscard]] bool has_commands(std::string_view text);
+
+/// `json`, which is JSON in UTF-8, with such characters of its texts as "\\u009b": fit for a terminal.
+[[nodiscard]] std::string printable_json(std::string_view json);
+
 /// `text` with U+FFFD in place of each byte that is no UTF-8.
 [[nodiscard]] std::string valid_utf8(std::string_view text);
 

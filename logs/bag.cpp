@@ -28,7 +28,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t most_read_topics = 10'000;
-constexpr std::size_t most_named = 10;  ///< files that cannot be read
+constexpr std::size_t longest_topic = 1000;  ///< bytes of its name, and of its type's: ROS allows some 250
+constexpr std::size_t most_named = 10;       ///< files that cannot be read
 
 /// A definition in a recording, parsed, or why that failed.
 struct ParsedDefinition {
@@ -214,6 +215,12 @@ class Bag final : public BagReader {
     const auto& own = source_->topics();
     while (places_.size() < own.size()) {
       const bag::SourceTopic& topic = own[places_.size()];
+      for (const std::string* const name : {&topic.name, &topic.type}) {
+        if (name->size() > longest_topic) {
+          throw InputError(fmt::format("{}: a topic's name or type of {} bytes, {}: expected at most {}",
+                                       source_->report().path, name->size(), files::shown(*name), longest_topic));
+        }
+      }
       std::vector<std::size_t>& alike = topic_places_[{topic.name, topic.type, topic.encoding}];
       if (const auto same = same_of(topic, alike); same != alike.end()) {
         places_.push_back(*same);

@@ -217,7 +217,16 @@ SqliteResults::SqliteResults(const fs::path& file, const StoredPlan& plan, Store
     : file_(file), plan_(plan), items_(std::move(items)) {
   check::that(std::map<std::string, std::string>(plan.begin(), plan.end()).size() == plan.size(), "plan",
               "each name once");
-  tables_ = std::make_unique<Tables>(file, plan, opening);
+  std::error_code none;
+  const bool there = fs::exists(file, none);
+  try {
+    tables_ = std::make_unique<Tables>(file, plan, opening);
+  } catch (const Error&) {
+    if (!there && fs::is_regular_file(file, none) && fs::is_empty(file, none)) {
+      fs::remove(file, none);
+    }
+    throw;
+  }
 }
 
 SqliteResults::~SqliteResults() = default;

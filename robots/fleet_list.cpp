@@ -163,7 +163,7 @@ std::vector<FleetListRobot> read_list(const fs::path& path) {
       continue;
     }
     const std::string where = fmt::format("{}:{}", path.string(), lines.number());
-    if (std::ranges::any_of(line, [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t'; })) {
+    if (files::has_commands(line)) {
       throw InputError(where + ": a control character: expected text, robot and log of a row as the header has them");
     }
     const std::vector<std::string> fields = fields_of(line, where);

@@ -201,6 +201,12 @@ std::string why_undecided(const OnlineModel& model, std::size_t rows, double ste
                         step, ratio, nominal, unit);
     }
   }
+  if (commission::hardly_goes_on(step, nominal)) {
+    return fmt::format(
+        "nothing is known of faults: the rows are {:.4g} s apart, {:.3g} times as far as those that the model was "
+        "commissioned on ({:.4g} s), by a clock that hardly goes on; is their time in s?",
+        step, ratio, nominal);
+  }
   if (ratio > sparser) {
     return text + fmt::format(
                       "the rows are {:.4g} s apart, {:.3g} times as far as those that the model was commissioned on "
@@ -223,6 +229,13 @@ std::string why_blind(const OnlineModel& model, const std::vector<std::string>& 
              ? fmt::format("rows too few, or too often interrupted, for the filter, which settles in {:.3g} s",
                            model.filter.settle / model.filter.beta)
              : fmt::format("{}", fmt::join(causes, "; "));
+}
+
+std::string crawling_words(const OnlineModel& model, std::size_t rows) {
+  return fmt::format(
+      "{} row{} came less than a hundredth of the model's step ({:.4g} s) behind the one before, by a clock that "
+      "hardly goes on; is their time in s?",
+      rows, rows == 1 ? "" : "s", model.measurement.nominal_step);
 }
 
 std::string blind_line(const commission::BlindSpell& spell, std::optional<double> until, const std::string& why) {

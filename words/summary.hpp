@@ -52,8 +52,8 @@ namespace wheelwright::words {
 /// The incidents for a terminal, a line each; empty where there are none.
 [[nodiscard]] std::string summary(const std::vector<detector::Incident>& incidents);
 
-/// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), with what to do
-/// about it.
+/// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), or at instants that
+/// tell nothing (commission::hardly_goes_on()), with what to do about it.
 [[nodiscard]] std::string why_undecided(const OnlineModel& model, std::size_t rows, double step);
 
 /// Why most of a log was not decided on: `instants` of the `rows` that were met; `repairs` says what reading found.
@@ -62,6 +62,9 @@ namespace wheelwright::words {
 
 /// Why rows of a stream bring no decision: `causes`, or that they are too few for the filter of `model`.
 [[nodiscard]] std::string why_blind(const OnlineModel& model, const std::vector<std::string>& causes);
+
+/// That `rows` of a stream were so near to those before them by its clock that they tell nothing to `model`.
+[[nodiscard]] std::string crawling_words(const OnlineModel& model, std::size_t rows);
 
 /// A spell without decisions in a line, for the reason `why`; `until` (s) where it is over.
 [[nodiscard]] std::string blind_line(const commission::BlindSpell& spell, std::optional<double> until,

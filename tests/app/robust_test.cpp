@@ -59,6 +59,10 @@ TEST_F(Robust, AStreamThatGoesBlindSaysSinceWhenAndWhy) {
        [](std::size_t, const std::string& line) { return line.substr(0, line.rfind(',')) + ",nan"; }},
       {"a clock that stands", "the same time stamp",
        [&](std::size_t, const std::string& line) { return with_time(line, half); }},
+      {"a clock that hardly goes on", "less than a hundredth",
+       [&](std::size_t k, const std::string& line) {
+         return with_time(line, half + 1e-9 * static_cast<double>(k - kHalf));
+       }},
       {"a clock that runs backwards", "time goes backwards",
        [&](std::size_t k, const std::string& line) {
          return with_time(line, half - 0.01 * static_cast<double>(k - kHalf));
@@ -87,6 +91,17 @@ TEST_F(Robust, AStreamThatGoesBlindSaysSinceWhenAndWhy) {
     EXPECT_TRUE(blind.at("until").is_null());
     EXPECT_THAT(blind.at("reason").get<std::string>(), HasSubstr(each.reason)) << each.name;
   }
+}
+
+// A robot at rest, whose seconds are read as thousandths of them: "no fault in 0.0 s".
+TEST_F(Robust, ALogByAClockThatHardlyGoesOnIsNotDecided) {
+  commission_shipped();
+  const std::vector<std::string> healthy = healthy_lines();
+  put_changed(1, kAll,
+              [&](std::size_t k, const std::string&) { return with_time(healthy[1], 1e-5 * static_cast<double>(k)); });
+  const Outcome outcome = run("detect log.csv --model model/model.json");
+  EXPECT_EQ(outcome.code, 2) << outcome.out;
+  EXPECT_THAT(outcome.err, HasSubstr("a clock that hardly goes on"));
 }
 
 TEST_F(Robust, AStreamThatSeesAgainSaysSoAndIsAnswered) {
@@ -236,8 +251,10 @@ TEST_F(Robust, AFleetWithLinksToItselfIsRead) {
   EXPECT_THAT(outcome.out, HasSubstr("amy"));
 }
 
-TEST_F(Robust, AFleetListWithAZeroByteIsRefused) {
-  for (const std::string& row : {std::string("amy,mon\0day.csv\n", 16), std::string("a\0my,monday.csv\n", 16)}) {
+TEST_F(Robust, AFleetListWithAControlCharacterIsRefused) {
+  for (const std::string& row : {std::string("amy,mon\0day.csv\n", 16), std::string("a\0my,monday.csv\n", 16),
+                                 std::string("a\xC2\x9B"
+                                             "31my,monday.csv\n")}) {
     put("fleet.csv", "robot,log\n" + row);
     const Outcome outcome = run("fleet fleet.csv --robot robot.yaml");
     EXPECT_EQ(outcome.code, 2);

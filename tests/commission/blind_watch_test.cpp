@@ -55,6 +55,22 @@ TEST(BlindWatch, ATooSlowStreamCountsByItsOwnClockAndOneThatRunsBackwardsToo) {
   }
 }
 
+// Seconds that are read as thousandths of them: what is decided there is of hardly any time.
+TEST(BlindWatch, AClockThatHardlyGoesOnIsTold) {
+  BlindWatch watch(kStep, kSettling);
+  EXPECT_FALSE(watch.crawls(5.0));
+  EXPECT_FALSE(watch.decided(5.0));
+  EXPECT_TRUE(watch.crawls(5.0 + 0.9e-2 * kStep));
+  EXPECT_FALSE(watch.crawls(5.0 + 1.1e-2 * kStep)) << "a hundred times as many rows are none too many";
+  EXPECT_FALSE(watch.crawls(4.0)) << "another clock";
+  int rows = 1;
+  for (double t = 5.0 + 1e-5; !watch.undecided(t); t += 1e-5) {
+    ASSERT_LT(++rows, 1000);
+    ASSERT_TRUE(watch.crawls(t + 1e-5));
+  }
+  EXPECT_EQ(rows, 301);
+}
+
 TEST(BlindWatch, RefusesWhatIsNoTime) {
   EXPECT_THROW(BlindWatch(-1.0, kSettling), InvalidArgument);
   EXPECT_THROW(BlindWatch(kStep, -1.0), InvalidArgument);

@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
+#include <wheelwright/files/json.hpp>
 #include <wheelwright/files/words.hpp>
 
 namespace wheelwright::files::printable_test {
@@ -48,6 +51,23 @@ TEST(Printable, BytesThatAreNoUtf8AreShown) {
 TEST(Printable, ANameStaysOnItsLine) {
   EXPECT_EQ(one_line("a.csv\nproved\t\x1B[2J"), "a.csv\\x0Aproved\\x09\\x1B[2J");
   EXPECT_EQ(one_line("µ.csv"), "µ.csv");
+}
+
+// `--json` handed the commands of a file's name on to the terminal.
+TEST(Printable, JsonSaysCommandsInItsOwnWords) {
+  const Json said = {{"name",
+                      "x\xC2\x9B"
+                      "31m\x7F\x1B \xE2\x80\xAE µ 🤖 \" \\"},
+                     {"\xC2\x9D", 1}};
+  const std::string text = json_text(said);
+  EXPECT_EQ(printable(text), text);
+  EXPECT_FALSE(has_commands(text));
+  EXPECT_NE(text.find("x\\u009b31m\\u007f\\u001b \\u202e µ 🤖"), std::string::npos) << text;
+  EXPECT_EQ(Json::parse(text), said);
+  for (const std::string& name : {std::string("a\xC2\x9B"), std::string("\x7F"), std::string("\0", 1)}) {
+    EXPECT_TRUE(has_commands(name));
+  }
+  EXPECT_FALSE(has_commands("µ\t\xFF\xC2"));
 }
 
 TEST(Utf8, IsMade) {

@@ -73,6 +73,25 @@ TEST_F(Temporaries, WhatAKilledWriterLeftUnderAnotherNameIsRemovedToo) {
   EXPECT_THAT(names(), ::testing::UnorderedElementsAre("tuesday.csv", "wednesday.csv", "notes.wheelwright-parts"));
 }
 
+// A recording or a result of many files, of which the next wrote one.
+TEST_F(Temporaries, ADirectoryOfAKilledProgramIsRemovedByTheNextFile) {
+  const auto make = [&](const std::string& name) {
+    return new Temporary(path(name), Temporary::Kind::directory, "it", "room");
+  };
+  killed_after([&] {
+    atomic_write(make("bag.wheelwright-part")->path() / "bag_0.mcap", "half");
+    atomic_write(make(".wheelwright-part")->path() / "model.json", "half");
+  });
+  ASSERT_EQ(names().size(), 2u);
+  const std::unique_ptr<Temporary> living(make("other.wheelwright-part"));
+  put("other.wheelwright-part0/model.json", "mine");
+  fs::create_directories(path("monday/other.wheelwright-part1"));
+  atomic_write(path("log.csv"), "a log");
+  EXPECT_THAT(names(), ::testing::UnorderedElementsAre("log.csv", "other.wheelwright-part0", "monday"));
+  EXPECT_TRUE(fs::exists(path("other.wheelwright-part0/model.json")));
+  EXPECT_TRUE(fs::exists(path("monday/other.wheelwright-part1")));
+}
+
 TEST_F(Temporaries, ADirectoryOfAKilledProgramIsRemovedByTheNext) {
   const auto make = [&] { return new Temporary(path("copy-"), Temporary::Kind::private_directory, "it", "room"); };
   killed_after([&] { atomic_write(make()->path() / "large.db3", "bytes"); });
@@ -132,13 +151,18 @@ TEST_F(Temporaries, ADirectoryThatMayNotBeReadIsWrittenInto) {
 }
 
 TEST_F(Temporaries, WhatIsNoFileOfOursIsLeftAlone) {
-  fs::create_directory(path("log.csv.wheelwright-part0"));
+  ASSERT_EQ(mkfifo(path("log.csv.wheelwright-part0").c_str(), 0600), 0);
   put("somewhere", "dear");
+  fs::create_directory(path("folder"));
+  put("folder/file", "dear");
   fs::create_symlink(path("somewhere"), path("log.csv.wheelwright-part1"));
+  fs::create_directory_symlink(path("folder"), path("log.csv.wheelwright-part2"));
   atomic_write(path("log.csv"), "a log");
-  EXPECT_TRUE(fs::is_directory(path("log.csv.wheelwright-part0")));
+  EXPECT_TRUE(fs::is_fifo(path("log.csv.wheelwright-part0")));
   EXPECT_TRUE(fs::is_symlink(path("log.csv.wheelwright-part1")));
+  EXPECT_TRUE(fs::is_symlink(path("log.csv.wheelwright-part2")));
   EXPECT_EQ(bytes(path("somewhere")), "dear");
+  EXPECT_EQ(bytes(path("folder/file")), "dear");
 }
 
 TEST_F(Temporaries, APipeIsWrittenToAndStaysOne) {

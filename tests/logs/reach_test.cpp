@@ -234,6 +234,17 @@ TEST_F(Reach, ARecordingOfTenThousandTopicsIsNone) {
   expect_refusal([&] { (void)open_bag({path("topics.db3")}); }, {"topics.db3", "more than 10000 topics"});
 }
 
+// A message that names all topics had 50 MB.
+TEST_F(Reach, ATopicWithoutEndIsNone) {
+  for (const std::string column : {"name", "type"}) {
+    const fs::path file = path(column + ".db3");
+    testing::write_humble(file, sample_items(3));
+    EXPECT_EQ(all_items(*open_bag({file})), sample_items(3));
+    testing::Sql(file).run("UPDATE topics SET " + column + " = '/' || hex(zeroblob(2000))");
+    expect_refusal([&] { (void)open_bag({file}); }, {column + ".db3", " bytes", "at most 1000"});
+  }
+}
+
 TEST_F(Reach, APackedRecordingIsKnownByItsContent) {
   // Frames of one byte each, as a hostile or careless writer makes them.
   testing::write_humble(path("plain.db3"), sample_items(3));

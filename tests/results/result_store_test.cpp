@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -50,6 +51,21 @@ class ResultStoreTest : public testing::ScratchTest {
 
   std::filesystem::path file() const { return path("results.sqlite"); }
 };
+
+// A limit of the size of files left a store without a byte, and with it its folder.
+TEST_F(ResultStoreTest, OneThatCannotBeBegunLeavesNothing) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const rlimit none{.rlim_cur = 0, .rlim_max = 0};
+    std::signal(SIGXFSZ, SIG_IGN);
+    setrlimit(RLIMIT_FSIZE, &none);
+    const bool said = !input_error([&] { SqliteResults(file(), kPlan, items(4)); }).empty();
+    _exit(said && std::filesystem::is_empty(directory_) ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
 
 // The store is opened where it stands. A journal beside it, as a killed run leaves one, may name a file that SQLite
 // deletes when it has played the journal back.

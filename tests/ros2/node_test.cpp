@@ -366,6 +366,28 @@ TEST_F(RosNode, TimeThatGoesBackBeginsAnew) {
   EXPECT_THAT(tick().message, HasSubstr("with a stamp that goes back"));
 }
 
+// Decisions about no time are none.
+TEST_F(RosNode, AClockThatHardlyGoesOnIsBlindness) {
+  start();
+  const LogTable log = drive("healthy.yaml");
+  const auto creeping = [&](std::size_t k) {
+    auto message = row(log, k);
+    const auto since = static_cast<std::uint32_t>(50'000 * (k - 3000));
+    message.header.stamp = row(log, 3000).header.stamp;
+    message.header.stamp.nanosec += since;
+    return message;
+  };
+  for (std::size_t k = 0; k < 3000; ++k) {
+    send(row(log, k));
+  }
+  EXPECT_EQ(tick().level, DiagnosticStatus::OK);
+  for (std::size_t k = 3000; k < 4000; ++k) {
+    send(creeping(k));
+  }
+  EXPECT_EQ(tick().level, DiagnosticStatus::WARN);
+  EXPECT_THAT(tick().message, HasSubstr("less than a hundredth of the model's step"));
+}
+
 TEST_F(RosNode, ParametersThatMakeNoSenseAreRefused) {
   const auto message = [&](std::vector<rclcpp::Parameter> parameters) -> std::string {
     try {

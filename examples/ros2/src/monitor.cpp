@@ -15,9 +15,10 @@ namespace wheelwright_diagnostics {
 namespace {
 
 constexpr std::size_t kNowhere = std::numeric_limits<std::size_t>::max();
-constexpr double kOfSettling = 1.5;   // as commission::BlindWatch
-constexpr double kFewestRows = 20.0;  // as there
-constexpr double kLargest = 1e9;      // a larger value is none: the filter would not forget it
+constexpr double kOfSettling = 1.5;     // as commission::BlindWatch
+constexpr double kFewestRows = 20.0;    // as there
+constexpr double kShareOfAStep = 0.01;  // as commission::hardly_goes_on()
+constexpr double kLargest = 1e9;        // a larger value is none: the filter would not forget it
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::size_t kNamesShown = 4;
 
@@ -136,7 +137,9 @@ bool Monitor::take(const JointMessage& message, double now) {
     sample_[side] /= static_cast<double>(count[side]);
   }
   const wheelwright::Decision& decision = detector_.step(t, sample_);
-  if (!decision.valid) {
+  const bool crawls = goes_on && t - before < kShareOfAStep * model_.measurement.nominal_step;
+  causes_.crawling += crawls ? 1 : 0;
+  if (!decision.valid || crawls) {
     undecided(t);
     return false;
   }
@@ -257,6 +260,7 @@ std::string Monitor::why_blind() const {
   add(causes_.not_finite, "with a motion or effort of " + causes_.not_finite_name + " that is no finite number");
   add(causes_.repeated, "with the stamp of the one before");
   add(causes_.backwards, "with a stamp that goes back");
+  add(causes_.crawling, "less than a hundredth of the model's step after the one before");
   add(causes_.gaps, "more than five steps of the model (" + number("%.3g", model_.measurement.nominal_step) +
                         " s) after the one before");
   return text.empty() ? "the filter settles in " + number("%.3g", model_.filter.settle / model_.filter.beta) +

@@ -94,7 +94,7 @@ class Monitor {
   };
   // Why messages of the present spell brought no row.
   struct Causes {
-    std::size_t missing = 0, no_values = 0, not_finite = 0, repeated = 0, backwards = 0, gaps = 0;
+    std::size_t missing = 0, no_values = 0, not_finite = 0, repeated = 0, backwards = 0, crawling = 0, gaps = 0;
     std::string missing_name, no_values_name, not_finite_name;
   };
 
