@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <set>
 
@@ -524,11 +525,14 @@ HealthView make_view(const LogTable& log, const std::optional<Robot>& robot) {
   for (const auto& column : log.columns) {
     check::that(column.size() == log.rows(), "log", "columns as long as its time");
   }
+  std::vector<std::size_t> starts = log.segment_starts;
+  check::that(std::ranges::adjacent_find(starts, std::greater_equal()) == starts.end() &&
+                  (starts.empty() || starts.back() < log.rows()),
+              "log", "segments that begin at rows of it, in ascending order, each once");
   view.robot_given = robot.has_value();
   view.robot = robot ? *robot : stand_in(log);
   view.model = model::make_model(view.robot);
   view.step = core::median_step(log.t);
-  std::vector<std::size_t> starts = log.segment_starts;
   if (starts.empty() || starts.front() != 0) {
     starts.insert(starts.begin(), 0);
   }

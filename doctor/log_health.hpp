@@ -98,7 +98,8 @@ struct LogHealth {
 /// The checks and their thresholds are in docs/doctor.md. Excitation is that of the filtered regressor (25) as
 /// commission_robot() makes it: settle(), fit_log() and identifiability(); the delay between effort and motion is that
 /// of TimeShiftedRows with its standard error. Throws nothing for what a log may hold; InvalidArgument for a robot that
-/// makes no sense or a log whose columns differ in length. The result does not depend on `threads`.
+/// makes no sense, a log whose columns differ in length, or segments that do not ascend over its rows. The result does
+/// not depend on `threads`.
 [[nodiscard]] LogHealth examine(const LogTable& log, const std::optional<Robot>& robot = std::nullopt,
                                 const ReaderCounts& reader = {}, std::size_t threads = 1);
 

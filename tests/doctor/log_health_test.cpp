@@ -140,6 +140,18 @@ TEST_F(LogHealthTest, MissingSamplesAreCountedAndPlaced) {
   EXPECT_LE(found.when.back().upper, 20.0);
 }
 
+// Starts of segments that are no rows, or stand there twice, were looked up in front of the first row and behind the last.
+TEST_F(LogHealthTest, SegmentsOfATableBeginAtItsRows) {
+  const std::size_t rows = log.rows();
+  for (const std::vector<std::size_t>& starts :
+       {std::vector<std::size_t>{0, 0, 1000}, {1000, 500}, {0, rows}, {rows + 7}}) {
+    log.segment_starts = starts;
+    EXPECT_THROW(examine(log, robot), InvalidArgument) << ::testing::PrintToString(starts);
+  }
+  log.segment_starts = {rows - 1};
+  EXPECT_NO_THROW(examine(log, robot));
+}
+
 TEST_F(LogHealthTest, GapsResetsAndDroppedRowsAreTold) {
   log.segment_starts = {0, 1000, 2000};
   for (std::size_t k = 1000; k < log.rows(); ++k) {
@@ -272,6 +284,7 @@ TEST_F(LogHealthTest, ALatePoseIsTimedInALongLogToo) {
     std::copy_backward(column.begin(), column.end() - kLate, column.end());
   }
   const double length = once.t.back() - once.t.front() + 1.0;
+  log.segment_starts = {0};
   const auto times = static_cast<std::size_t>(std::ceil(1500.0 / length));
   for (std::size_t k = 1; k < times; ++k) {
     const LogTable& next = 2 * k < times ? once : late;
@@ -283,7 +296,6 @@ TEST_F(LogHealthTest, ALatePoseIsTimedInALongLogToo) {
       log.columns[c].insert(log.columns[c].end(), next.columns[c].begin(), next.columns[c].end());
     }
   }
-  log.segment_starts.insert(log.segment_starts.begin(), 0);
   const LogHealth health = examine(log, robot);
   const LogFinding* const found = health.find("time.pose_delay");
   ASSERT_NE(found, nullptr);
