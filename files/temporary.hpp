@@ -17,7 +17,8 @@ class Temporary {
   enum class Kind { file, directory, private_directory };
 
   /// Makes `stem` + a number. Where `stem` ends in ".wheelwright-part", those that killed programs left in its directory
-  /// for other names, files and directories, are removed, too, at a program's first there. Throws InputError, naming `shown` and `expected`, when that cannot be.
+  /// for other names, files and directories, are removed, too, at a program's first there. Throws InputError, naming
+  /// `shown` and `expected`, when that cannot be.
   Temporary(const std::filesystem::path& stem, Kind kind, const std::string& shown, const std::string& expected);
   /// Removes it with all that is in it, unless move_to() did its work.
   ~Temporary();
