@@ -56,28 +56,6 @@ constexpr const char* kExamples =
     "half of the rows, or, with --follow, at none of the last ones. --follow tells such spells as they come (blind),\n"
     "and when no row has come for 5 s (silent). With --out they are appended to DIR/events.jsonl, too.";
 
-// The share of the rows that were met at which nothing was decided; 0 where it is hardly more than the filter settles in.
-double undecided_share(const Detection& detection, const OnlineModel& model, const logs::RecordedLog& log) {
-  constexpr double kWorthAWord = 0.05;
-  const auto rows = static_cast<double>(log.report().rows_read);
-  const double settling = model.filter.settle / (model.filter.beta * log.median_step());
-  const double undecided = rows - static_cast<double>(detection.instants);
-  return undecided - settling > kWorthAWord * rows ? undecided / rows : 0.0;
-}
-
-// Why the log as a whole is not decided; empty where it is: all but what the filter settles in, or half of it.
-std::string why_not_decided(const Detection& detection, const OnlineModel& model, const logs::RecordedLog& log) {
-  const logs::LogReport& report = log.report();
-  if (detection.instants == 0 || commission::hardly_goes_on(log.median_step(), model.measurement.nominal_step)) {
-    return why_undecided(model, report.rows, log.median_step());
-  }
-  const double settling = model.filter.settle / (model.filter.beta * log.median_step());
-  const auto rows = static_cast<double>(report.rows_read);
-  return static_cast<double>(detection.instants) + settling < 0.5 * rows
-             ? why_mostly_undecided(detection.instants, report.rows_read, logs::sentences(report))
-             : std::string();
-}
-
 // Files that --series and --layouts may write.
 std::vector<std::filesystem::path> series_files(const Arguments& a, const OnlineModel& model) {
   std::vector<std::filesystem::path> files;
@@ -197,8 +175,10 @@ int run(const Arguments& a) {
       commission::join_events(log, model, detection, isolations, kinematic, isolation);
   const bool fault = !detection.events.empty() || !at_risk.events.empty() ||
                      (kinematic.detection && !kinematic.detection->events.empty());
-  const std::string undecided = why_not_decided(detection, model, log);
-  const double share = undecided_share(detection, model, log);
+  const logs::LogReport& read = log.report();
+  const std::string undecided =
+      why_not_decided(detection, model, read.rows, log.median_step(), read.rows_read, logs::sentences(read));
+  const double share = undecided_share(detection, model, log.median_step(), read.rows_read);
   if (!a.common.out.empty() || a.common.json) {
     Json json = results::to_json(detection, model, a.model.string(), a.log.string(), results::software());
     results::add_isolation(json, isolations);
@@ -215,7 +195,7 @@ int run(const Arguments& a) {
     if (!a.common.out.empty()) {
       page = report::detect_report(detection, model, context,
                                    {.detection = kinematic.detection, .message = kinematic.message}, isolations,
-                                   at_risk, incidents);
+                                   at_risk, incidents, undecided);
     }
     publish(a.common, json, "detection.json", page);
   }

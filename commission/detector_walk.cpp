@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include <wheelwright/commission/blind_watch.hpp>
+
 namespace wheelwright::commission {
 namespace {
 
@@ -152,6 +154,31 @@ Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptio
   d.events = recorder.events();
   d.trace = binner.trace();
   return d;
+}
+
+namespace {
+
+// Rows that the filter settles in, once.
+double settling_rows(const OnlineModel& model, double step) { return model.filter.settle / (model.filter.beta * step); }
+
+}  // namespace
+
+Watched how_watched(const Detection& detection, const OnlineModel& model, double step, std::size_t met) {
+  if (detection.instants == 0) {
+    return Watched::nothing;
+  }
+  if (hardly_goes_on(step, model.measurement.nominal_step)) {
+    return Watched::no_time;
+  }
+  const double decided = static_cast<double>(detection.instants) + settling_rows(model, step);
+  return decided < 0.5 * static_cast<double>(met) ? Watched::little : Watched::enough;
+}
+
+double undecided_share(const Detection& detection, const OnlineModel& model, double step, std::size_t met) {
+  constexpr double kWorthAWord = 0.05;
+  const auto rows = static_cast<double>(met);
+  const double undecided = rows - static_cast<double>(detection.instants);
+  return undecided - settling_rows(model, step) > kWorthAWord * rows ? undecided / rows : 0.0;
 }
 
 template Detection detect(LogSource& log, TorqueDetector detector, const DetectionOptions& options);

@@ -96,6 +96,22 @@ template <filter::RowFilter Filter>
 extern template Detection detect(LogSource& log, TorqueDetector detector, const DetectionOptions& options);
 extern template Detection detect(LogSource& log, detector::KinematicDetector detector, const DetectionOptions& options);
 
+/// What a detection says of its log as a whole.
+enum class Watched {
+  enough,   ///< half of its rows at least, or all but what the filter settles in
+  little,   ///< fewer than half: of most of the log nothing is known
+  no_time,  ///< instants of a clock that hardly goes on (hardly_goes_on())
+  nothing,  ///< no instant
+};
+
+/// What `detection`, by `model`, says of a log with rows `step` (s) apart of which `met` were met, those included that
+/// could not be used.
+[[nodiscard]] Watched how_watched(const Detection& detection, const OnlineModel& model, double step, std::size_t met);
+
+/// The share of those rows at which nothing was decided; 0 where it is at most 0.05 beside what the filter settles in.
+[[nodiscard]] double undecided_share(const Detection& detection, const OnlineModel& model, double step,
+                                     std::size_t met);
+
 /// Detection by the kinematic residual, beside that by the torque residual.
 struct KinematicWatch {
   std::optional<Detection> detection;  ///< nothing where it was not watched

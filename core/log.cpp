@@ -2,6 +2,7 @@
 #include <wheelwright/core/log.hpp>
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include <wheelwright/core/check.hpp>
@@ -52,6 +53,13 @@ double median_step(const std::vector<double>& t) {
   return median(std::move(steps));
 }
 
+void check_segments(const LogTable& table) {
+  const std::vector<std::size_t>& starts = table.segment_starts;
+  check::that(std::ranges::adjacent_find(starts, std::greater_equal()) == starts.end() &&
+                  (starts.empty() || starts.back() < std::max<std::size_t>(table.rows(), 1)),
+              "log", "segments that begin at rows of it, in ascending order, each once");
+}
+
 LogTable slice(const LogTable& table, std::size_t first, std::size_t last) {
   check::that(first <= last && last <= table.rows(), "slice", "first <= last <= rows of the table");
   const auto part = [&](const std::vector<double>& from) {
@@ -84,6 +92,7 @@ TableSource::TableSource(const LogTable& table, std::size_t block_rows)
       check::finite(value, "log column '" + table.names[c] + "'");
     }
   }
+  check_segments(table);
   for (std::size_t k = 0; k < table.rows(); ++k) {
     check::finite(table.t[k], "log time");
     const bool starts = k == 0 || std::binary_search(table.segment_starts.begin(), table.segment_starts.end(), k);

@@ -87,6 +87,10 @@ void for_each_row(LogSource& log, Visit&& visit) {
 /// Median of the steps of `t` (the steps across segment starts included), s; 0 for fewer than two rows.
 [[nodiscard]] double median_step(const std::vector<double>& t);
 
+/// Throws InvalidArgument unless the segments of `table` begin at rows of it, in ascending order, each once. Row 0 may
+/// begin one where there are no rows.
+void check_segments(const LogTable& table);
+
 /// Rows [first, last) of `table`; a segment that is cut starts anew. Throws InvalidArgument unless
 /// first <= last <= rows.
 [[nodiscard]] LogTable slice(const LogTable& table, std::size_t first, std::size_t last);
@@ -94,8 +98,8 @@ void for_each_row(LogSource& log, Visit&& visit) {
 /// A LogSource over a table, which must outlive it.
 class TableSource final : public LogSource {
  public:
-  /// Throws InvalidArgument when columns differ in length, time does not increase inside a segment, or a value is not
-  /// finite.
+  /// Throws InvalidArgument when columns differ in length, time does not increase inside a segment, a value is not
+  /// finite, or segments do not begin at rows (check_segments()).
   explicit TableSource(const LogTable& table, std::size_t block_rows = 4096);
   [[nodiscard]] const std::vector<std::string>& columns() const override;
   bool next(LogBlock& block) override;

@@ -525,10 +525,8 @@ HealthView make_view(const LogTable& log, const std::optional<Robot>& robot) {
   for (const auto& column : log.columns) {
     check::that(column.size() == log.rows(), "log", "columns as long as its time");
   }
+  core::check_segments(log);
   std::vector<std::size_t> starts = log.segment_starts;
-  check::that(std::ranges::adjacent_find(starts, std::greater_equal()) == starts.end() &&
-                  (starts.empty() || starts.back() < log.rows()),
-              "log", "segments that begin at rows of it, in ascending order, each once");
   view.robot_given = robot.has_value();
   view.robot = robot ? *robot : stand_in(log);
   view.model = model::make_model(view.robot);

@@ -150,6 +150,8 @@ struct DetectionObject {
   std::vector<detector::Isolation> isolations;
   commission::RiskWatch at_risk;
   std::vector<detector::Incident> incidents;
+  std::string undecided;
+  double undecided_share = 0.0;
 
   [[nodiscard]] bool fault() const {
     return !detection.events.empty() || !at_risk.events.empty() ||
@@ -161,6 +163,12 @@ struct DetectionObject {
     results::add_kinematic(json, kinematic, *model.model);
     results::add_at_risk(json, at_risk, *model.model);
     results::add_incidents(json, incidents);
+    if (!undecided.empty()) {
+      json["undecided"] = undecided;
+    }
+    if (undecided_share > 0.0) {
+      json["undecided_share"] = undecided_share;
+    }
     return json;
   }
   [[nodiscard]] std::string summary() const {
@@ -184,7 +192,7 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
     const LogWalk walk(log);
     logs::require_columns(*log.source, model->measurement.columns());
     WatchedLog source(*log.source, work);
-    DetectionObject out{{model, given.path}, log.name(), {}, {}, {}, {}, {}};
+    DetectionObject out{{model, given.path}, log.name(), {}, {}, {}, {}, {}, {}, 0.0};
     const auto tell = work.teller();
     tell("the torque residual", 0.0);
     out.detection = detect(source, make_detector(*model, own));
@@ -197,6 +205,10 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
     isolation.isolation.threads = threads;
     out.isolations = commission::isolate_events(source, *model, out.detection, isolation);
     out.incidents = commission::join_events(source, *model, out.detection, out.isolations, out.kinematic, isolation);
+    const logs::LogReport& read = log.source->report();
+    out.undecided = words::why_not_decided(out.detection, *model, read.rows, log.source->median_step(), read.rows_read,
+                                           logs::sentences(read));
+    out.undecided_share = undecided_share(out.detection, *model, log.source->median_step(), read.rows_read);
     tell("done", 1.0);
     return out;
   });
@@ -341,6 +353,10 @@ void bind_detector(py::module_& m) {
             return list;
           },
           "events that one fault explains, as in detection.json")
+      .def_readonly(
+          "undecided", &DetectionObject::undecided,
+          "why the log as a whole was not decided on, so that no fault seen says nothing of it; empty where it "
+          "was")
       .def_property_readonly("summary", &DetectionObject::summary)
       .def(
           "to_dict", [](const DetectionObject& d) { return to_python(d.json()); },

@@ -157,7 +157,8 @@ std::string at_risk_section(const commission::RiskWatch& watch, const OnlineMode
 
 std::string detect_report(const Detection& detection, const OnlineModel& model, const ReportContext& context,
                           const KinematicFindings& kinematic, const std::vector<detector::Isolation>& isolations,
-                          const commission::RiskWatch& at_risk, const std::vector<detector::Incident>& incidents) {
+                          const commission::RiskWatch& at_risk, const std::vector<detector::Incident>& incidents,
+                          const std::string& undecided) {
   const TimeAxis axis = axis_for(detection, context);
   std::vector<std::vector<ChartMark>> marks(detection.trace.outputs.size());
   std::vector<ChartMark> all_marks;
@@ -174,8 +175,11 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   content.title = context.title.empty() ? "Detection on " + model.robot.name : context.title;
   const std::size_t kinematic_events = kinematic.detection ? kinematic.detection->events.size() : 0;
   const bool fault = !detection.events.empty() || kinematic_events > 0 || !at_risk.events.empty();
-  content.status = fault ? "bad" : detection.instants == 0 ? "caution" : "good";
-  content.verdict = detect_verdict(detection, kinematic_events + at_risk.events.size());
+  content.status = fault ? "bad" : detection.instants == 0 || !undecided.empty() ? "caution" : "good";
+  content.verdict = detect_verdict(detection, kinematic_events + at_risk.events.size(), !undecided.empty());
+  if (!undecided.empty()) {
+    content.sentences.push_back(core::capital(undecided) + ".");
+  }
   for (const detector::Incident& incident : incidents) {  // what an event may be is said of its incident
     content.sentences.push_back(core::capital(incident_sentence(incident)));
   }

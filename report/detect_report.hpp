@@ -26,12 +26,14 @@ struct KinematicFindings {
 /// residual inside [l, u] with the events shaded, prediction, raw signals, data, and the same of
 /// the kinematic residual. `at_risk` is the same log under the detector at a stated risk. `isolations` belong to the
 /// first events, in their order; `incidents` join all events and stand first. It loads nothing when opened; every name
-/// is escaped, every number is finite. `context.own_log` is not used.
+/// is escaped, every number is finite. `undecided` says why the log as a whole was not decided on; empty where it was.
+/// `context.own_log` is not used.
 [[nodiscard]] std::string detect_report(const Detection& detection, const OnlineModel& model,
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
                                         const std::vector<detector::Isolation>& isolations = {},
                                         const commission::RiskWatch& at_risk = {},
-                                        const std::vector<detector::Incident>& incidents = {});
+                                        const std::vector<detector::Incident>& incidents = {},
+                                        const std::string& undecided = {});
 
 /// Smallest certain size over the delay, both logarithmic: for each manoeuvre the median over its onsets, and the size
 /// that is certain at every one of them (thin). Empty where nothing is certain.

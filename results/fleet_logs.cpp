@@ -83,7 +83,8 @@ study::FleetLog log_of(const robots::FleetListRobot& robot, const std::vector<ro
     auto log = open_sound_log(paths, declared, std::move(options), reading.despite, WheelPose::judged).log;
     logs::require_columns(*log, robots::needed_columns(declared));
     Robot robot_with_errors = model::with_column_errors(declared, logs::interpolation_errors(log->report()));
-    return study::OpenedLog{std::move(log), std::move(robot_with_errors)};
+    const std::size_t met = log->report().rows_read;
+    return study::OpenedLog{std::move(log), std::move(robot_with_errors), met};
   };
   return out;
 }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <exception>
 
+#include <fmt/format.h>
+
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/physical.hpp>
 
@@ -71,11 +73,27 @@ void take_events(CheckRecord& check, const std::vector<detector::Event>& events)
   }
 }
 
-// The detector's walk. A kinematic residual is watched where the log has its columns.
-void watch(CheckRecord& check, LogSource& log, const OnlineModel& model, const detector::DetectorOptions& options) {
+// Why a log counts as not looked at; empty where it does.
+std::string why_not_watched(const Detection& torque, const OnlineModel& model, double step, std::size_t met) {
+  switch (how_watched(torque, model, step, met)) {
+    case commission::Watched::enough: return {};
+    case commission::Watched::little:
+      return fmt::format("only {} of {} rows could be decided on", torque.instants, met);
+    case commission::Watched::no_time:
+      return fmt::format("its rows are {:.4g} s apart, by a clock that hardly goes on", step);
+    case commission::Watched::nothing:
+      return fmt::format("no instant of its {} rows, {:.4g} s apart, could be decided on", met, step);
+  }
+  return {};
+}
+
+// The detector's walk. A kinematic residual is watched where the log has its columns. A fault that is seen counts,
+// however little else was.
+void watch(CheckRecord& check, const OpenedLog& opened, const OnlineModel& model,
+           const detector::DetectorOptions& options) {
+  LogSource& log = *opened.log;
   const commission::DetectionOptions thin{.most_points = 2};
   const Detection torque = detect(log, make_detector(model, options), thin);
-  check.checked = true;
   check.instants = torque.instants;
   for (const std::size_t outside : torque.outside) {
     const double share =
@@ -83,13 +101,15 @@ void watch(CheckRecord& check, LogSource& log, const OnlineModel& model, const d
     check.outside_share = std::max(check.outside_share, share);
   }
   take_events(check, torque.events);
-  if (!model.kinematic) {
-    return;
+  if (model.kinematic) {
+    const auto columns = model.kinematic->measurement.columns();
+    if (std::all_of(columns.begin(), columns.end(), [&](const std::string& c) { return log.find(c).has_value(); })) {
+      take_events(check, detect(log, make_detector(*model.kinematic, options), thin).events);
+    }
   }
-  const auto columns = model.kinematic->measurement.columns();
-  if (std::all_of(columns.begin(), columns.end(), [&](const std::string& c) { return log.find(c).has_value(); })) {
-    take_events(check, detect(log, make_detector(*model.kinematic, options), thin).events);
-  }
+  check.not_checked =
+      check.events > 0 ? "" : why_not_watched(torque, model, log.median_step(), std::max(opened.met, torque.rows));
+  check.checked = check.not_checked.empty();
 }
 
 CheckRecord check_log(const FleetLog& log, const std::optional<OnlineModel>& model, const ExamineOptions& options) {
@@ -105,7 +125,7 @@ CheckRecord check_log(const FleetLog& log, const std::optional<OnlineModel>& mod
   }
   if (model) {
     try {
-      watch(check, *opened.log, *model, options.detector);
+      watch(check, opened, *model, options.detector);
     } catch (const std::exception& error) {
       check = {};
       check.not_checked = error.what();

@@ -3,6 +3,7 @@
 /// One robot of a fleet, examined: the item of work of `wheelwright fleet`.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
@@ -18,6 +19,7 @@ namespace wheelwright::study {
 struct OpenedLog {
   std::unique_ptr<LogSource> log;
   Robot robot;
+  std::size_t met = 0;  ///< rows that were met, those included that could not be used; 0 where all could
 };
 
 /// A log of a robot that is opened when its turn comes. `open` throws where it cannot be.

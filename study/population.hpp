@@ -73,7 +73,7 @@ struct LogRecord {
 /// A later log: looked at by the detector of the commissioned model, and commissioned anew to see what moved.
 struct CheckRecord {
   LogRecord log;
-  bool checked = false;           ///< there was a model, and the detector could walk the log
+  bool checked = false;           ///< there was a model, and the detector decided on the log or saw a fault
   std::string not_checked;        ///< why it was not; else empty
   std::size_t events = 0;         ///< alarms of both residuals
   std::optional<double> first{};  ///< time of the first alarm, s of the log

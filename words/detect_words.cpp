@@ -58,12 +58,13 @@ std::string first_isolation(const std::vector<detector::Isolation>& isolations) 
 
 }  // namespace
 
-std::string detect_verdict(const Detection& detection, std::size_t kinematic_events) {
+std::string detect_verdict(const Detection& detection, std::size_t kinematic_events, bool undecided) {
   if (detection.instants == 0 && kinematic_events == 0) {
     return "Nothing was watched: the log has no instant with a decision.";
   }
   const std::size_t events = detection.events.size() + kinematic_events;
-  return events == 0
+  return events == 0 && undecided ? "Not decided: of most of the log nothing is known."
+         : events == 0
              ? "No fault was seen."
              : fmt::format("{}: the robot did not behave like its model.", core::capital(plural(events, "event")));
 }

@@ -17,8 +17,10 @@
 
 namespace wheelwright::words {
 
-/// One short sentence; `kinematic_events` are those of the kinematic residual. Text, not HTML.
-[[nodiscard]] std::string detect_verdict(const Detection& detection, std::size_t kinematic_events);
+/// One short sentence; `kinematic_events` are those of the kinematic residual, and `undecided` whether the log as a
+/// whole was not decided on (why_not_decided()). Text, not HTML.
+[[nodiscard]] std::string detect_verdict(const Detection& detection, std::size_t kinematic_events,
+                                         bool undecided = false);
 
 /// The residuals that were checked; where there are events: the first and the clearest one, how much of the driving
 /// contradicts the fault-free model, what this means, and the faults of the catalogue that remain possible for the

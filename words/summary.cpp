@@ -224,6 +224,17 @@ std::string why_mostly_undecided(std::size_t instants, std::size_t rows, const s
                      instants, rows, repairs.empty() ? "" : ": ", fmt::join(repairs, "; "));
 }
 
+std::string why_not_decided(const Detection& detection, const OnlineModel& model, std::size_t rows, double step,
+                            std::size_t met, const std::vector<std::string>& repairs) {
+  switch (commission::how_watched(detection, model, step, met)) {
+    case commission::Watched::enough: return {};
+    case commission::Watched::little: return why_mostly_undecided(detection.instants, met, repairs);
+    case commission::Watched::no_time:
+    case commission::Watched::nothing: break;
+  }
+  return why_undecided(model, rows, step);
+}
+
 std::string why_blind(const OnlineModel& model, const std::vector<std::string>& causes) {
   return causes.empty()
              ? fmt::format("rows too few, or too often interrupted, for the filter, which settles in {:.3g} s",

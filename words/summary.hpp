@@ -56,6 +56,12 @@ namespace wheelwright::words {
 /// tell nothing (commission::hardly_goes_on()), with what to do about it.
 [[nodiscard]] std::string why_undecided(const OnlineModel& model, std::size_t rows, double step);
 
+/// Why `detection`, by `model`, says nothing of a log as a whole (commission::how_watched()), with what to do about it;
+/// empty where it does. `rows` are those with the median step `step` (s), `met` those that were met, and `repairs` says
+/// what reading found.
+[[nodiscard]] std::string why_not_decided(const Detection& detection, const OnlineModel& model, std::size_t rows,
+                                          double step, std::size_t met, const std::vector<std::string>& repairs);
+
 /// Why most of a log was not decided on: `instants` of the `rows` that were met; `repairs` says what reading found.
 [[nodiscard]] std::string why_mostly_undecided(std::size_t instants, std::size_t rows,
                                                const std::vector<std::string>& repairs);

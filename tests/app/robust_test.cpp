@@ -99,9 +99,12 @@ TEST_F(Robust, ALogByAClockThatHardlyGoesOnIsNotDecided) {
   const std::vector<std::string> healthy = healthy_lines();
   put_changed(1, kAll,
               [&](std::size_t k, const std::string&) { return with_time(healthy[1], 1e-5 * static_cast<double>(k)); });
-  const Outcome outcome = run("detect log.csv --model model/model.json");
+  const Outcome outcome = run("detect log.csv --model model/model.json --out watch");
   EXPECT_EQ(outcome.code, 2) << outcome.out;
   EXPECT_THAT(outcome.err, HasSubstr("a clock that hardly goes on"));
+  EXPECT_THAT(
+      bytes(path("watch/report.html")),
+      AllOf(HasSubstr("Not decided"), HasSubstr("a clock that hardly goes on"), Not(HasSubstr("No fault was seen"))));
 }
 
 TEST_F(Robust, AStreamThatSeesAgainSaysSoAndIsAnswered) {

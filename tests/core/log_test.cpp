@@ -90,6 +90,9 @@ TEST(TableSource, MisuseIsRefused) {
   refused([](LogTable& log) { log.columns[0][2] = std::nan(""); });
   refused([](LogTable& log) { log.t[2] = std::numeric_limits<double>::infinity(); });
   refused([](LogTable& log) { log.t[2] = log.t[1]; });
+  for (const std::vector<std::size_t>& starts : {std::vector<std::size_t>{0, 2, 2}, {3, 1}, {0, 5}, {7}}) {
+    refused([&](LogTable& log) { log.segment_starts = starts; });
+  }
   LogTable reset = table(5, {0, 2});
   reset.t[2] = reset.t[3] = -1.0;
   EXPECT_THROW(TableSource{reset}, InvalidArgument);

@@ -92,6 +92,20 @@ class Check(Commands):
             ww.check(commissioned().model, healthy_log())
 
 
+class Detect(Commands):
+    def test_a_log_that_is_not_decided_says_so(self):
+        columns = healthy_log().to_arrays()
+        clock = 1e-6 * np.arange(len(columns["t"]))  # of a robot at rest
+        still = ww.Log({name: clock if name == "t" else np.full_like(values, values[0])
+                        for name, values in columns.items()}, robot())
+        found = ww.detect(still, ww.read_model(model_file()))
+        self.assertFalse(found.fault)
+        self.assertIn("a clock that hardly goes on", found.undecided)
+        self.assertEqual(found.to_dict()["undecided"], found.undecided)
+        self.assertIn("nothing decided", repr(found))
+        self.assertEqual(ww.detect(healthy_log(), ww.read_model(model_file())).undecided, "")
+
+
 class Compare(Commands):
     def test_files_models_and_a_model_in_memory(self):
         heavy = path("heavy.json")

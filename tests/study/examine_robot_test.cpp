@@ -97,6 +97,38 @@ TEST(ExamineRobot, BadLogsAreFindings) {
   EXPECT_EQ(lost.checks[1].log.message, "cut off");
 }
 
+// "Later logs raised no alarm" is not said of logs of which nothing, or nearly nothing, was decided.
+TEST(ExamineRobot, ALogThatIsNotDecidedIsNotChecked) {
+  const Scenario scenario = noisy_drive(2);
+  Simulation drive(scenario);
+  const LogTable whole = read_all(drive);
+  LogTable creeping = whole;  // a robot at rest, by a clock of 1 µs a row
+  for (std::size_t k = 0; k < creeping.rows(); ++k) {
+    creeping.t[k] = 1e-6 * static_cast<double>(k);
+  }
+  for (std::vector<double>& column : creeping.columns) {
+    std::ranges::fill(column, 0.0);
+  }
+  const LogTable brief = core::slice(whole, 0, 1);
+  const auto logged = [&](const LogTable& table, std::size_t met) {
+    return FleetLog{.name = "check", .open = [&table, met, robot = scenario.robot] {
+                      return OpenedLog{std::make_unique<TableSource>(table), robot, met};
+                    }};
+  };
+  const RobotRecord record = examine_robot(
+      {.robot = "r1",
+       .commissioning = driven(scenario.parameters.mass, 1),
+       .checks = {logged(whole, 0), logged(whole, 10 * whole.rows()), logged(creeping, 0), logged(brief, 0)}});
+  ASSERT_EQ(record.checks.size(), 4U);
+  EXPECT_TRUE(record.checks[0].checked) << record.checks[0].not_checked;
+  EXPECT_EQ(record.checks[0].events, 0U);
+  const std::vector<std::string> reasons = {"only", "hardly goes on", "no instant"};
+  for (std::size_t i = 0; i < reasons.size(); ++i) {
+    EXPECT_FALSE(record.checks[i + 1].checked) << reasons[i];
+    EXPECT_NE(record.checks[i + 1].not_checked.find(reasons[i]), std::string::npos) << record.checks[i + 1].not_checked;
+  }
+}
+
 TEST(ExamineRobot, AContradictionIsAStatus) {
   // One torque is wrong by ten times what is declared.
   const Scenario scenario = noisy_drive(4);
