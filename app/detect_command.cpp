@@ -185,12 +185,7 @@ int run(const Arguments& a) {
     results::add_kinematic(json, kinematic, model);
     results::add_at_risk(json, at_risk, model);
     results::add_incidents(json, incidents);
-    if (!undecided.empty()) {
-      json["undecided"] = undecided;
-    }
-    if (share > 0.0) {
-      json["undecided_share"] = share;
-    }
+    results::add_undecided(json, undecided, share);
     std::string page;
     if (!a.common.out.empty()) {
       page = report::detect_report(detection, model, context,

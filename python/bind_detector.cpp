@@ -163,12 +163,7 @@ struct DetectionObject {
     results::add_kinematic(json, kinematic, *model.model);
     results::add_at_risk(json, at_risk, *model.model);
     results::add_incidents(json, incidents);
-    if (!undecided.empty()) {
-      json["undecided"] = undecided;
-    }
-    if (undecided_share > 0.0) {
-      json["undecided_share"] = undecided_share;
-    }
+    results::add_undecided(json, undecided, undecided_share);
     return json;
   }
   [[nodiscard]] std::string summary() const {

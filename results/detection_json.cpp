@@ -99,6 +99,15 @@ void add_incidents(Json& detection, const std::vector<detector::Incident>& incid
   }
 }
 
+void add_undecided(Json& detection, const std::string& why, double share) {
+  if (!why.empty()) {
+    detection["undecided"] = why;
+  }
+  if (share > 0.0) {
+    detection["undecided_share"] = share;
+  }
+}
+
 void add_isolation(Json& detection, const std::vector<detector::Isolation>& isolations) {
   using Verdict = detector::FaultFinding::Verdict;
   for (std::size_t k = 0; k < isolations.size(); ++k) {

@@ -38,6 +38,10 @@ namespace wheelwright::results {
 /// Adds the incidents, in their order, to a detection as JSON.
 void add_incidents(Json& detection, const std::vector<detector::Incident>& incidents);
 
+/// Adds to a detection why its log as a whole was not decided on (words::why_not_decided()), and the share of the rows
+/// that were not (commission::undecided_share()); nothing where `why` is empty, and where the share is 0.
+void add_undecided(Json& detection, const std::string& why, double share);
+
 /// Adds what its first events are isolated to to a detection as JSON, before add_kinematic().
 void add_isolation(Json& detection, const std::vector<detector::Isolation>& isolations);
 
