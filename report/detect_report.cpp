@@ -178,7 +178,7 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   content.status = fault ? "bad" : detection.instants == 0 || !undecided.empty() ? "caution" : "good";
   content.verdict = detect_verdict(detection, kinematic_events + at_risk.events.size(), !undecided.empty());
   if (!undecided.empty()) {
-    content.sentences.push_back(core::capital(undecided) + ".");
+    content.sentences.push_back(core::capital(undecided) + (undecided.ends_with('?') ? "" : "."));
   }
   for (const detector::Incident& incident : incidents) {  // what an event may be is said of its incident
     content.sentences.push_back(core::capital(incident_sentence(incident)));

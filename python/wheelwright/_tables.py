@@ -77,7 +77,7 @@ def _events(d: core.Detection) -> list[tuple[str, core.Event]]:
 def _detection(d: core.Detection) -> Shown:
     incidents = (Row(f"incident {k + 1}", i["alarm"], (i["start"], i["end"]), "s", i["sentence"])
                  for k, i in enumerate(d.incidents))
-    found = "fault" if d.fault else f"nothing decided ({d.undecided})" if d.undecided else "no fault"
+    found = "fault" if d.fault else f"not decided: {d.undecided}" if d.undecided else "no fault"
     return Shown(f"of {found}: {len(_events(d))} events, {len(d.incidents)} incidents", incidents)
 
 

@@ -102,7 +102,7 @@ class Detect(Commands):
         self.assertFalse(found.fault)
         self.assertIn("a clock that hardly goes on", found.undecided)
         self.assertEqual(found.to_dict()["undecided"], found.undecided)
-        self.assertIn("nothing decided", repr(found))
+        self.assertIn("not decided", repr(found))
         self.assertEqual(ww.detect(healthy_log(), ww.read_model(model_file())).undecided, "")
 
 
