@@ -156,6 +156,9 @@ Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptio
   return d;
 }
 
+template Detection detect(LogSource& log, TorqueDetector detector, const DetectionOptions& options);
+template Detection detect(LogSource& log, detector::KinematicDetector detector, const DetectionOptions& options);
+
 namespace {
 
 // Rows that the filter settles in, once.
@@ -180,9 +183,6 @@ double undecided_share(const Detection& detection, const OnlineModel& model, dou
   const double undecided = rows - static_cast<double>(detection.instants);
   return undecided - settling_rows(model, step) > kWorthAWord * rows ? undecided / rows : 0.0;
 }
-
-template Detection detect(LogSource& log, TorqueDetector detector, const DetectionOptions& options);
-template Detection detect(LogSource& log, detector::KinematicDetector detector, const DetectionOptions& options);
 
 namespace {
 

@@ -71,7 +71,7 @@ void IncidentWatch::row(double t, const std::vector<double>& sample, bool restar
   if (restarts && !rows_.t.empty() && waiting_.empty()) {
     rows_ = core::slice(rows_, rows_.rows(), rows_.rows());
   }
-  if (restarts && (rows_.segment_starts.empty() || rows_.segment_starts.back() < rows_.rows())) {
+  if (restarts) {
     rows_.segment_starts.push_back(rows_.rows());
   }
   rows_.t.push_back(t);

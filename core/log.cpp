@@ -72,7 +72,9 @@ LogTable slice(const LogTable& table, std::size_t first, std::size_t last) {
   for (const auto& column : table.columns) {
     out.columns.push_back(part(column));
   }
-  out.segment_starts.push_back(0);
+  if (first < last) {
+    out.segment_starts.push_back(0);
+  }
   for (const std::size_t start : table.segment_starts) {
     if (start > first && start < last) {
       out.segment_starts.push_back(start - first);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <set>
 
@@ -526,11 +525,11 @@ HealthView make_view(const LogTable& log, const std::optional<Robot>& robot) {
     check::that(column.size() == log.rows(), "log", "columns as long as its time");
   }
   core::check_segments(log);
-  std::vector<std::size_t> starts = log.segment_starts;
   view.robot_given = robot.has_value();
   view.robot = robot ? *robot : stand_in(log);
   view.model = model::make_model(view.robot);
   view.step = core::median_step(log.t);
+  std::vector<std::size_t> starts = log.segment_starts;
   if (starts.empty() || starts.front() != 0) {
     starts.insert(starts.begin(), 0);
   }
