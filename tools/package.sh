@@ -33,6 +33,8 @@ trap 'rm -rf "$scratch"' EXIT
 cpack --config build/CPackConfig.cmake -B "$scratch" >"$scratch/log" || { cat "$scratch/log" >&2; exit 1; }
 mv "$scratch"/*.deb "$out"
 
+tools/check_elf.py "$out"/*.deb
+
 # The address is whoever's who packs, and this is no upload to Debian.
 as_root=''
 [ "$(id -u)" -ne 0 ] || as_root=--allow-root
