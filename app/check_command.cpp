@@ -5,14 +5,13 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/results/check_words.hpp>
-#include <wheelwright/results/model_check.hpp>
-#include <wheelwright/results/model_file.hpp>
-
-#include "check_report.hpp"
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
+#include "app/check_report.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "results/check_words.hpp"
+#include "results/model_check.hpp"
+#include "results/model_file.hpp"
 
 namespace wheelwright::app {
 namespace check_command {

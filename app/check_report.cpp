@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "check_report.hpp"
+#include "app/check_report.hpp"
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/report/sections.hpp>
-#include <wheelwright/results/check_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "report/page.hpp"
+#include "report/sections.hpp"
+#include "results/check_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include <wheelwright/results/model_check.hpp>
+#include "results/model_check.hpp"
 
 namespace wheelwright::app {
 

@@ -8,17 +8,16 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/detector_choice.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/report/choice_report.hpp>
-#include <wheelwright/results/detection_json.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "commission/detector_choice.hpp"
+#include "core/error.hpp"
+#include "report/choice_report.hpp"
+#include "results/detection_json.hpp"
+#include "results/model_file.hpp"
+#include "robots/robot_file.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 namespace choose_command {

@@ -8,21 +8,20 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/two_walks.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include <wheelwright/results/detection_json.hpp>
-#include <wheelwright/words/summary.hpp>
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
-#include "sound_log.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "app/sound_log.hpp"
+#include "commission/commission.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/two_walks.hpp"
+#include "files/bytes.hpp"
+#include "report/commission_report.hpp"
+#include "report/page.hpp"
+#include "results/detection_json.hpp"
+#include "results/model_file.hpp"
+#include "robots/robot_file.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "common.hpp"
+#include "app/common.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -19,13 +19,13 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/bag_files.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/report/signals.hpp>
+#include "files/bytes.hpp"
+#include "files/words.hpp"
+#include "logs/bag_files.hpp"
+#include "logs/csv.hpp"
+#include "logs/recorded_log.hpp"
+#include "model/robot.hpp"
+#include "report/signals.hpp"
 
 namespace wheelwright::app {
 

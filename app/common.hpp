@@ -18,19 +18,18 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/detector.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/files/temporary.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "commands.hpp"
+#include "app/commands.hpp"
+#include "core/error.hpp"
+#include "detector/detector.hpp"
+#include "files/bytes.hpp"
+#include "files/json.hpp"
+#include "files/temporary.hpp"
+#include "files/words.hpp"
+#include "logs/log_file.hpp"
+#include "report/commission_report.hpp"
+#include "report/page.hpp"
+#include "results/software.hpp"
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::app {
 

@@ -5,16 +5,15 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/model_comparison.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/report/comparison_report.hpp>
-#include <wheelwright/results/comparison_json.hpp>
-#include <wheelwright/robots/online_model_file.hpp>
-#include <wheelwright/words/comparison_words.hpp>
-
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "commission/model_comparison.hpp"
+#include "core/words.hpp"
+#include "report/comparison_report.hpp"
+#include "results/comparison_json.hpp"
+#include "robots/online_model_file.hpp"
+#include "words/comparison_words.hpp"
 
 namespace wheelwright::app {
 namespace compare_command {

@@ -7,27 +7,26 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/design/detection.hpp>
-#include <wheelwright/design/manoeuvre.hpp>
-#include <wheelwright/design/stages.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/further_drive.hpp>
-#include <wheelwright/gap/named_rivals.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/report/design_report.hpp>
-#include <wheelwright/results/gap_json.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include <wheelwright/results/design_json.hpp>
-#include <wheelwright/words/summary.hpp>
-#include "commands.hpp"
-#include "common.hpp"
-#include "drive_files.hpp"
-#include "options.hpp"
-#include "units.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/drive_files.hpp"
+#include "app/options.hpp"
+#include "app/units.hpp"
+#include "design/detection.hpp"
+#include "design/manoeuvre.hpp"
+#include "design/stages.hpp"
+#include "files/words.hpp"
+#include "gap/discrimination_design.hpp"
+#include "gap/effect.hpp"
+#include "gap/further_drive.hpp"
+#include "gap/named_rivals.hpp"
+#include "logs/csv.hpp"
+#include "report/design_report.hpp"
+#include "results/design_json.hpp"
+#include "results/gap_json.hpp"
+#include "results/model_file.hpp"
+#include "robots/robot_file.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

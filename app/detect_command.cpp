@@ -8,21 +8,20 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/incident_watch.hpp>
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/report/detect_report.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/results/model_file.hpp>
-
-#include <wheelwright/results/detection_json.hpp>
-#include <wheelwright/words/summary.hpp>
-#include "commands.hpp"
-#include "common.hpp"
-#include "follow.hpp"
-#include "options.hpp"
-#include "series.hpp"
-#include "units.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/follow.hpp"
+#include "app/options.hpp"
+#include "app/series.hpp"
+#include "app/units.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/incident_watch.hpp"
+#include "commission/risk_watch.hpp"
+#include "report/detect_report.hpp"
+#include "report/page.hpp"
+#include "results/detection_json.hpp"
+#include "results/model_file.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

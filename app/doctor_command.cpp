@@ -6,15 +6,14 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/report/health_report.hpp>
-#include <wheelwright/results/health_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "doctor/log_health.hpp"
+#include "report/health_report.hpp"
+#include "results/health_json.hpp"
+#include "robots/robot_file.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 namespace doctor_command {

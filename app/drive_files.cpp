@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "drive_files.hpp"
+#include "app/drive_files.hpp"
 
-#include <wheelwright/design/plan.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/velocity_commands.hpp>
+#include "design/plan.hpp"
+#include "logs/csv.hpp"
+#include "logs/velocity_commands.hpp"
 
 namespace wheelwright::app {
 

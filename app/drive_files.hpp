@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::app {
 

@@ -5,15 +5,14 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/export/export_c.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/results/model_json.hpp>
-
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "commission/risk_watch.hpp"
+#include "export/export_c.hpp"
+#include "files/bytes.hpp"
+#include "results/model_file.hpp"
+#include "results/model_json.hpp"
 
 namespace wheelwright::app {
 namespace export_command {

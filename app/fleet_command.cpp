@@ -14,21 +14,20 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/report/fleet_report.hpp>
-#include <wheelwright/results/fleet_json.hpp>
-#include <wheelwright/results/fleet_logs.hpp>
-#include <wheelwright/robots/fleet_list.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/study/examine_robot.hpp>
-#include <wheelwright/study/fleet_result.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
-#include "run_items.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "app/run_items.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
+#include "report/fleet_report.hpp"
+#include "results/fleet_json.hpp"
+#include "results/fleet_logs.hpp"
+#include "robots/fleet_list.hpp"
+#include "robots/robot_file.hpp"
+#include "study/examine_robot.hpp"
+#include "study/fleet_result.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 namespace fleet_command {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "follow.hpp"
+#include "app/follow.hpp"
 
 #include <poll.h>
 
@@ -22,17 +22,16 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/blind_watch.hpp>
-#include <wheelwright/commission/incident_watch.hpp>
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/temporary.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/csv.hpp>
-
-#include <wheelwright/results/detection_json.hpp>
-#include <wheelwright/words/detect_words.hpp>
-#include <wheelwright/words/summary.hpp>
+#include "commission/blind_watch.hpp"
+#include "commission/incident_watch.hpp"
+#include "commission/risk_watch.hpp"
+#include "files/bytes.hpp"
+#include "files/temporary.hpp"
+#include "files/words.hpp"
+#include "logs/csv.hpp"
+#include "results/detection_json.hpp"
+#include "words/detect_words.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -5,10 +5,9 @@
 
 #include <filesystem>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/logs/csv_format.hpp>
-
-#include "common.hpp"
+#include "app/common.hpp"
+#include "commission/commission.hpp"
+#include "logs/csv_format.hpp"
 
 namespace wheelwright::app {
 

@@ -8,29 +8,28 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/gap/selection.hpp>
-#include <wheelwright/gap/simulator_change.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/gap_report.hpp>
-#include <wheelwright/results/gap_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/simulator_file.hpp>
-#include <wheelwright/words/gap_words.hpp>
-
-#include <wheelwright/gap/further_drive.hpp>
-#include <wheelwright/words/summary.hpp>
-#include "commands.hpp"
-#include "common.hpp"
-#include "drive_files.hpp"
-#include "options.hpp"
-#include "sound_log.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/drive_files.hpp"
+#include "app/options.hpp"
+#include "app/sound_log.hpp"
+#include "core/for_all.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
+#include "gap/diagnose.hpp"
+#include "gap/effect.hpp"
+#include "gap/further_drive.hpp"
+#include "gap/prepared.hpp"
+#include "gap/selection.hpp"
+#include "gap/simulator_change.hpp"
+#include "logs/csv.hpp"
+#include "report/commission_report.hpp"
+#include "report/gap_report.hpp"
+#include "results/gap_json.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/simulator_file.hpp"
+#include "words/gap_words.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

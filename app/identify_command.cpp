@@ -7,18 +7,17 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/inference/identification.hpp>
-#include <wheelwright/report/identify_report.hpp>
-#include <wheelwright/results/identification_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/words/identification_words.hpp>
-
-#include <wheelwright/words/summary.hpp>
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
-#include "sound_log.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "app/sound_log.hpp"
+#include "core/error.hpp"
+#include "inference/identification.hpp"
+#include "report/identify_report.hpp"
+#include "results/identification_json.hpp"
+#include "robots/robot_file.hpp"
+#include "words/identification_words.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -19,13 +19,12 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/temporary.hpp>
-
-#include "command_tree.hpp"
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
+#include "app/command_tree.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "core/error.hpp"
+#include "files/temporary.hpp"
 
 namespace {
 

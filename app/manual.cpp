@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "manual.hpp"
+#include "app/manual.hpp"
 
 #include <cctype>
 #include <sstream>
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/words.hpp>
+#include "core/words.hpp"
 
 namespace wheelwright::app {
 namespace {

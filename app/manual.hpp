@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "command_tree.hpp"
+#include "app/command_tree.hpp"
 
 namespace wheelwright::app {
 

@@ -8,16 +8,15 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/report/detect_report.hpp>
-#include <wheelwright/results/detection_json.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/words/detect_words.hpp>
-
-#include <wheelwright/words/text.hpp>
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "commission/margin_survey.hpp"
+#include "report/detect_report.hpp"
+#include "results/detection_json.hpp"
+#include "results/model_file.hpp"
+#include "words/detect_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "options.hpp"
+#include "app/options.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -11,10 +11,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
-
-#include "units.hpp"
+#include "app/units.hpp"
+#include "core/error.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -7,11 +7,10 @@
 #include <optional>
 #include <string>
 
-#include <wheelwright/detector/detector.hpp>
-
-#include "command_tree.hpp"
-#include "common.hpp"
-#include "run_items.hpp"
+#include "app/command_tree.hpp"
+#include "app/common.hpp"
+#include "app/run_items.hpp"
+#include "detector/detector.hpp"
 
 namespace CLI {
 class App;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
-#include "run_items.hpp"
+#include "app/run_items.hpp"
 
 namespace wheelwright::app {
 

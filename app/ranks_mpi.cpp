@@ -2,9 +2,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include <wheelwright/study/work_on_ranks.hpp>
-
-#include "run_items.hpp"
+#include "app/run_items.hpp"
+#include "study/work_on_ranks.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -6,15 +6,14 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/robots/controller_file.hpp>
-#include <wheelwright/robots/robot_description.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/robot_origin.hpp>
-
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "files/bytes.hpp"
+#include "robots/controller_file.hpp"
+#include "robots/robot_description.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/robot_origin.hpp"
 
 namespace wheelwright::app {
 namespace robot_command {

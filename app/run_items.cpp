@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run_items.hpp"
+#include "app/run_items.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -18,8 +18,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
+#include "files/bytes.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::app {
 

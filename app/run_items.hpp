@@ -11,10 +11,9 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/results/result_store.hpp>
-#include <wheelwright/study/work.hpp>
-
-#include "common.hpp"
+#include "app/common.hpp"
+#include "results/result_store.hpp"
+#include "study/work.hpp"
 
 namespace wheelwright::app {
 

@@ -6,17 +6,16 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/report/sensitivity_report.hpp>
-#include <wheelwright/results/study_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/study/study_work.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
-#include "run_items.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "app/run_items.hpp"
+#include "files/bytes.hpp"
+#include "report/sensitivity_report.hpp"
+#include "results/study_json.hpp"
+#include "robots/robot_file.hpp"
+#include "study/study_work.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "series.hpp"
+#include "app/series.hpp"
 
 #include <algorithm>
 #include <string>
@@ -9,14 +9,13 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/words/text.hpp>
-
-#include "common.hpp"
+#include "app/common.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/physical.hpp"
+#include "core/limits.hpp"
+#include "files/json.hpp"
+#include "logs/log_file.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::app {
 namespace {

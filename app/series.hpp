@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/online_model.hpp>
+#include "core/interval.hpp"
+#include "core/log.hpp"
+#include "detector/online_model.hpp"
 
 namespace wheelwright::app {
 

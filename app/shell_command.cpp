@@ -7,14 +7,13 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-
-#include "command_tree.hpp"
-#include "commands.hpp"
-#include "common.hpp"
-#include "manual.hpp"
-#include "options.hpp"
+#include "app/command_tree.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/manual.hpp"
+#include "app/options.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -6,13 +6,12 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "commands.hpp"
-#include "common.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "files/json.hpp"
+#include "logs/log_file.hpp"
+#include "results/scenario_file.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::app {
 namespace simulate_command {

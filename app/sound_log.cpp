@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sound_log.hpp"
+#include "app/sound_log.hpp"
 
 namespace wheelwright::app {
 

@@ -6,10 +6,9 @@
 #include <filesystem>
 #include <vector>
 
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/results/fleet_logs.hpp>
-
-#include "common.hpp"
+#include "app/common.hpp"
+#include "model/robot.hpp"
+#include "results/fleet_logs.hpp"
 
 namespace wheelwright::app {
 

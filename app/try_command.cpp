@@ -15,22 +15,21 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/inference/kinematic_calibration.hpp>
-#include <wheelwright/logs/bag.hpp>
-#include <wheelwright/model/model.hpp>
-#include <wheelwright/robots/controller_file.hpp>
-#include <wheelwright/robots/online_model_file.hpp>
-#include <wheelwright/robots/robot_description.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/robot_origin.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "commands.hpp"
-#include "common.hpp"
-#include "options.hpp"
-#include "sound_log.hpp"
+#include "app/commands.hpp"
+#include "app/common.hpp"
+#include "app/options.hpp"
+#include "app/sound_log.hpp"
+#include "core/error.hpp"
+#include "doctor/log_health.hpp"
+#include "inference/kinematic_calibration.hpp"
+#include "logs/bag.hpp"
+#include "model/model.hpp"
+#include "robots/controller_file.hpp"
+#include "robots/online_model_file.hpp"
+#include "robots/robot_description.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/robot_origin.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::app {
 namespace try_command {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "units.hpp"
+#include "app/units.hpp"
 
 #include <cmath>
 #include <map>
@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -9,13 +9,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/bag.hpp>
-#include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
-
-#include "bench.hpp"
-#include "temporary_file.hpp"
+#include "bench/bench.hpp"
+#include "bench/temporary_file.hpp"
+#include "core/error.hpp"
+#include "logs/bag.hpp"
+#include "logs/bag_write.hpp"
+#include "logs/ros_messages.hpp"
 
 namespace wheelwright::bench::bag_bench {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bench.hpp"
+#include "bench/bench.hpp"
 
 #include <algorithm>
 #include <cstdio>

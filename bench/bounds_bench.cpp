@@ -6,10 +6,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/minimax.hpp>
-
-#include "bench.hpp"
+#include "bench/bench.hpp"
+#include "bounds/feasible_set.hpp"
+#include "bounds/minimax.hpp"
 
 namespace wheelwright::bench::bounds_bench {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "clp_columns.hpp"
+#include "bench/clp_columns.hpp"
 
 #include <string>
 
@@ -8,7 +8,7 @@
 #include <ClpSimplex.hpp>
 #pragma GCC diagnostic pop
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::bench {
 

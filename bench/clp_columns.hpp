@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
+#include "bounds/box.hpp"
 
 class ClpSimplex;
 

@@ -7,12 +7,11 @@
 #include <ClpSimplex.hpp>
 #pragma GCC diagnostic pop
 
-#include <wheelwright/core/error.hpp>
-
-#include "clp_columns.hpp"
-#include "lp_pass.hpp"
-#include "lp_peers.hpp"
-#include "scaled_rows.hpp"
+#include "bench/clp_columns.hpp"
+#include "bench/lp_pass.hpp"
+#include "bench/lp_peers.hpp"
+#include "bench/scaled_rows.hpp"
+#include "core/error.hpp"
 
 namespace wheelwright::bench {
 namespace {

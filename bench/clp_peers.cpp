@@ -6,9 +6,9 @@
 #include <ClpSimplex.hpp>
 #pragma GCC diagnostic pop
 
-#include "clp_columns.hpp"
-#include "lp_peers.hpp"
-#include "scaled_rows.hpp"
+#include "bench/clp_columns.hpp"
+#include "bench/lp_peers.hpp"
+#include "bench/scaled_rows.hpp"
 
 namespace wheelwright::bench {
 

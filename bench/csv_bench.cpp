@@ -9,12 +9,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/logs/csv.hpp>
-
-#include "bench.hpp"
-#include "temporary_file.hpp"
+#include "bench/bench.hpp"
+#include "bench/temporary_file.hpp"
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "logs/csv.hpp"
 
 namespace wheelwright::bench::csv_bench {
 namespace {

@@ -8,18 +8,17 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/support_table.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/detector.hpp>
-#include <wheelwright/export/export_c.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "bench.hpp"
-#include "compiled_c.hpp"
-#include "drive_rows.hpp"
+#include "bench/bench.hpp"
+#include "bench/compiled_c.hpp"
+#include "bench/drive_rows.hpp"
+#include "bounds/feasible_set.hpp"
+#include "bounds/support_table.hpp"
+#include "core/error.hpp"
+#include "detector/detector.hpp"
+#include "export/export_c.hpp"
+#include "filter/measurement.hpp"
+#include "filter/row_stream.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::bench::detector_bench {
 

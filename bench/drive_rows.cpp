@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "drive_rows.hpp"
+#include "bench/drive_rows.hpp"
 
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/kernel.hpp>
-#include <wheelwright/sim/plant.hpp>
+#include "core/check.hpp"
+#include "filter/kernel.hpp"
+#include "sim/plant.hpp"
 
 namespace wheelwright::bench {
 namespace {

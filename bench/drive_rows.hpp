@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "bounds/box.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::bench {
 

@@ -30,14 +30,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
-#include <wheelwright/export/export_c.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/online_model_file.hpp>
-
-#include "compiled_c.hpp"
+#include "bench/compiled_c.hpp"
+#include "core/error.hpp"
+#include "detector/online_model.hpp"
+#include "detector/scale_detector.hpp"
+#include "export/export_c.hpp"
+#include "logs/csv.hpp"
+#include "robots/online_model_file.hpp"
 
 using namespace wheelwright;
 

@@ -9,15 +9,14 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/interval_hull.hpp>
-#include <wheelwright/bounds/minimax.hpp>
-#include <wheelwright/bounds/support_walk.hpp>
-#include <wheelwright/core/error.hpp>
-
-#include "bench.hpp"
-#include "drive_rows.hpp"
-#include "lp_peers.hpp"
+#include "bench/bench.hpp"
+#include "bench/drive_rows.hpp"
+#include "bench/lp_peers.hpp"
+#include "bounds/feasible_set.hpp"
+#include "bounds/interval_hull.hpp"
+#include "bounds/minimax.hpp"
+#include "bounds/support_walk.hpp"
+#include "core/error.hpp"
 
 namespace wheelwright::bench::engine_bench {
 namespace {

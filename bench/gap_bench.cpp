@@ -16,11 +16,10 @@
 #include <fmt/format.h>
 #include <Eigen/QR>
 
-#include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "bench.hpp"
+#include "bench/bench.hpp"
+#include "gap/diagnose.hpp"
+#include "gap/prepared.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::bench::gap_bench {
 namespace {

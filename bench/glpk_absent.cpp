@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Takes the place of glpk_peers.cpp where GLPK is absent.
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
-#include "lp_peers.hpp"
+#include "bench/lp_peers.hpp"
 
 namespace wheelwright::bench {
 

@@ -6,10 +6,9 @@
 
 #include <glpk.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "lp_peers.hpp"
-#include "scaled_rows.hpp"
+#include "bench/lp_peers.hpp"
+#include "bench/scaled_rows.hpp"
+#include "core/error.hpp"
 
 namespace wheelwright::bench {
 namespace {

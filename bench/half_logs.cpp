@@ -16,13 +16,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/minimax.hpp>
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "bounds/minimax.hpp"
+#include "commission/commission.hpp"
+#include "commission/detector_walk.hpp"
+#include "core/error.hpp"
+#include "filter/row_stream.hpp"
+#include "logs/csv.hpp"
+#include "robots/robot_file.hpp"
 
 using namespace wheelwright;
 

@@ -10,9 +10,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/identify/estimate.hpp>
-
-#include "bench.hpp"
+#include "bench/bench.hpp"
+#include "identify/estimate.hpp"
 
 #ifdef WHEELWRIGHT_LAPACK
 extern "C" void dgels_(const char* trans, const int* m, const int* n, const int* nrhs, double* a, const int* lda,

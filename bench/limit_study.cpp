@@ -28,13 +28,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/margins.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
-#include "limit/consistency.hpp"
+#include "bench/limit/consistency.hpp"
+#include "commission/commission.hpp"
+#include "core/error.hpp"
+#include "detector/margins.hpp"
+#include "logs/csv.hpp"
+#include "robots/robot_file.hpp"
+#include "sim/simulation.hpp"
 
 using namespace wheelwright;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compiled for the processor at hand where the compiler can, as the user of a loop would: keep other headers out.
-#include "lp_pass.hpp"
+#include "bench/lp_pass.hpp"
 
 #include <algorithm>
 

@@ -14,9 +14,8 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-
-#include "drive_rows.hpp"
+#include "bench/drive_rows.hpp"
+#include "bounds/box.hpp"
 
 namespace wheelwright::bench {
 

@@ -9,12 +9,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/core/error.hpp>
-
-#include "bench.hpp"
-#include "drive_rows.hpp"
-#include "lp_peers.hpp"
+#include "bench/bench.hpp"
+#include "bench/drive_rows.hpp"
+#include "bench/lp_peers.hpp"
+#include "bounds/feasible_set.hpp"
+#include "core/error.hpp"
 
 namespace wheelwright::bench::lp_peers_bench {
 namespace {

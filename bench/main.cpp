@@ -13,7 +13,7 @@
 
 #include <fmt/format.h>
 
-#include "bench.hpp"
+#include "bench/bench.hpp"
 
 namespace {
 

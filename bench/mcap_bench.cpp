@@ -11,11 +11,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/mcap.hpp>
-
-#include "bench.hpp"
-#include "temporary_file.hpp"
+#include "bench/bench.hpp"
+#include "bench/temporary_file.hpp"
+#include "core/error.hpp"
+#include "logs/mcap.hpp"
 
 namespace wheelwright::bench::mcap_bench {
 namespace {

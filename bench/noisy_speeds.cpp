@@ -18,11 +18,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/fit.hpp>
-#include <wheelwright/commission/setting.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "commission/fit.hpp"
+#include "commission/setting.hpp"
+#include "core/statistics.hpp"
+#include "identify/noise_level.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::bench {
 namespace {

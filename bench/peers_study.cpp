@@ -24,11 +24,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "peers/bank.hpp"
-#include "peers/field.hpp"
+#include "bench/peers/bank.hpp"
+#include "bench/peers/field.hpp"
+#include "core/error.hpp"
+#include "sim/simulation.hpp"
 
 using namespace wheelwright;
 using namespace wheelwright::peers;

@@ -20,15 +20,14 @@
 #include <fmt/format.h>
 #include <Eigen/QR>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "bench.hpp"
+#include "bench/bench.hpp"
+#include "commission/commission.hpp"
+#include "commission/detector_walk.hpp"
+#include "core/error.hpp"
+#include "filter/row_stream.hpp"
+#include "identify/least_squares.hpp"
+#include "logs/csv.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::bench::pipeline_bench {
 namespace {

@@ -13,8 +13,8 @@
 
 #include <sys/resource.h>
 
-#include <wheelwright/results/result_store.hpp>
-#include <wheelwright/study/work_on_ranks.hpp>
+#include "results/result_store.hpp"
+#include "study/work_on_ranks.hpp"
 
 namespace {
 

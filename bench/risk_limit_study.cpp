@@ -22,12 +22,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "limit/likelihood.hpp"
-#include "peers/field.hpp"
+#include "bench/limit/likelihood.hpp"
+#include "bench/peers/field.hpp"
+#include "core/error.hpp"
+#include "detector/scale_detector.hpp"
+#include "sim/simulation.hpp"
 
 using namespace wheelwright;
 using namespace wheelwright::peers;

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "lp_peers.hpp"
+#include "bench/lp_peers.hpp"
 
 namespace wheelwright::bench {
 

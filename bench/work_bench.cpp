@@ -10,12 +10,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/results/result_store.hpp>
-#include <wheelwright/study/work.hpp>
-
-#include "bench.hpp"
-#include "temporary_file.hpp"
+#include "bench/bench.hpp"
+#include "bench/temporary_file.hpp"
+#include "core/error.hpp"
+#include "results/result_store.hpp"
+#include "study/work.hpp"
 
 namespace wheelwright::bench::work_bench {
 namespace {

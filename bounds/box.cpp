@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/box.hpp>
+#include "bounds/box.hpp"
 
-#include <wheelwright/core/linear_algebra.hpp>
+#include "core/linear_algebra.hpp"
 
 namespace wheelwright::bounds {
 

@@ -12,8 +12,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/interval.hpp>
+#include "core/check.hpp"
+#include "core/interval.hpp"
 
 namespace wheelwright::bounds {
 

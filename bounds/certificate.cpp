@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/certificate.hpp>
+#include "bounds/certificate.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include <boost/multiprecision/cpp_bin_float.hpp>
 
-#include <wheelwright/bounds/linear_program.hpp>
-#include <wheelwright/core/interval.hpp>
+#include "bounds/linear_program.hpp"
+#include "core/interval.hpp"
 
 namespace wheelwright::bounds {
 

@@ -16,8 +16,8 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
+#include "bounds/box.hpp"
+#include "bounds/slab_rows.hpp"
 
 namespace wheelwright::bounds {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/check_certificate.hpp>
-#include <wheelwright/core/limits.hpp>
+#include "bounds/check_certificate.hpp"
+#include "core/limits.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/cutter.hpp>
+#include "bounds/cutter.hpp"
 
 #include <algorithm>
 #include <cmath>

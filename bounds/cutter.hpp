@@ -7,9 +7,9 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/bounds/cutting_planes.hpp>
-#include <wheelwright/bounds/interval_hull.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
+#include "bounds/cutting_planes.hpp"
+#include "bounds/interval_hull.hpp"
+#include "bounds/slab_rows.hpp"
 
 namespace wheelwright::bounds {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/cutting_planes.hpp>
+#include "bounds/cutting_planes.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
-#include <wheelwright/bounds/certificate.hpp>
+#include "bounds/certificate.hpp"
 
 namespace wheelwright::bounds {
 namespace {

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/linear_program.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
+#include "bounds/certificate.hpp"
+#include "bounds/linear_program.hpp"
+#include "bounds/slab_rows.hpp"
 
 namespace wheelwright::bounds {
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/feasible_set.hpp>
+#include "bounds/feasible_set.hpp"
 
 #include <algorithm>
 #include <map>
 #include <set>
 #include <utility>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/cutter.hpp>
-#include <wheelwright/bounds/survey.hpp>
+#include "bounds/certificate.hpp"
+#include "bounds/cutter.hpp"
+#include "bounds/survey.hpp"
 
 namespace wheelwright::bounds {
 namespace {

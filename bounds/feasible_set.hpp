@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "bounds/polytope.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::bounds {
 

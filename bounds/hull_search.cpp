@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/hull_search.hpp>
+#include "bounds/hull_search.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <thread>
 
-#include <wheelwright/bounds/kernels.hpp>
+#include "bounds/kernels.hpp"
 
 namespace wheelwright::bounds {
 namespace {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/interval_hull.hpp>
+#include "bounds/interval_hull.hpp"
 
 #include <algorithm>
 #include <functional>
 #include <numeric>
 
-#include <wheelwright/bounds/cutter.hpp>
-#include <wheelwright/bounds/hull_search.hpp>
-#include <wheelwright/bounds/survey.hpp>
+#include "bounds/cutter.hpp"
+#include "bounds/hull_search.hpp"
+#include "bounds/survey.hpp"
 
 namespace wheelwright::bounds {
 namespace {

@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/bounds/cutting_planes.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "bounds/cutting_planes.hpp"
+#include "bounds/slab_rows.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::bounds {
 

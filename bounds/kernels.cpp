@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/kernels.hpp>
+#include "bounds/kernels.hpp"
 
-#include <wheelwright/bounds/kernels_impl.hpp>
-#include <wheelwright/core/vector_units.hpp>
+#include "bounds/kernels_impl.hpp"
+#include "core/vector_units.hpp"
 
 namespace wheelwright::bounds::kernels {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/kernels_impl.hpp>
+#include "bounds/kernels_impl.hpp"
 
 namespace wheelwright::bounds::kernels {
 

@@ -9,7 +9,7 @@
 #include <immintrin.h>
 #endif
 
-#include <wheelwright/bounds/kernels.hpp>
+#include "bounds/kernels.hpp"
 
 namespace wheelwright::bounds::kernels {
 

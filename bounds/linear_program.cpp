@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/linear_program.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
+#include "bounds/linear_program.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/kernels.hpp>
+#include "bounds/kernels.hpp"
 
 namespace wheelwright::bounds {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/minimax.hpp>
+#include "bounds/minimax.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,11 +8,11 @@
 #include <optional>
 #include <span>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/linear_program.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/bounds/survey.hpp>
-#include <wheelwright/core/limits.hpp>
+#include "bounds/certificate.hpp"
+#include "bounds/linear_program.hpp"
+#include "bounds/slab_rows.hpp"
+#include "bounds/survey.hpp"
+#include "core/limits.hpp"
 
 namespace wheelwright::bounds {
 namespace {

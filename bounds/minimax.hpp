@@ -5,10 +5,10 @@
 
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/interval_hull.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "bounds/box.hpp"
+#include "bounds/interval_hull.hpp"
+#include "bounds/slab_rows.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::bounds {
 

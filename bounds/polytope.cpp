@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/polytope.hpp>
+#include "bounds/polytope.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,12 +11,12 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/random.hpp>
+#include "bounds/certificate.hpp"
+#include "bounds/slab_rows.hpp"
+#include "core/interval.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/random.hpp"
 
 namespace wheelwright::bounds {
 namespace {

@@ -9,9 +9,9 @@
 #include <variant>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/cutting_planes.hpp>
+#include "bounds/box.hpp"
+#include "bounds/certificate.hpp"
+#include "bounds/cutting_planes.hpp"
 
 namespace wheelwright::bounds {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/slab_rows.hpp>
+#include "bounds/slab_rows.hpp"
 
 namespace wheelwright::bounds {
 namespace {

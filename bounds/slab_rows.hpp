@@ -10,8 +10,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "bounds/box.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::bounds {
 

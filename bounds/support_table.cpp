@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/support_table.hpp>
+#include "bounds/support_table.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/bounds/known_size.hpp>
-#include <wheelwright/core/limits.hpp>
+#include "bounds/known_size.hpp"
+#include "core/limits.hpp"
 
 namespace wheelwright::bounds {
 

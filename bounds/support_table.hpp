@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/bounds/support_walk.hpp>
+#include "bounds/polytope.hpp"
+#include "bounds/support_walk.hpp"
 
 namespace wheelwright::bounds {
 

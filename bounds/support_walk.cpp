@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/support_walk.hpp>
+#include "bounds/support_walk.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include <wheelwright/bounds/known_size.hpp>
-#include <wheelwright/bounds/linear_program.hpp>
-#include <wheelwright/core/limits.hpp>
+#include "bounds/known_size.hpp"
+#include "bounds/linear_program.hpp"
+#include "core/limits.hpp"
 
 namespace wheelwright::bounds {
 namespace {

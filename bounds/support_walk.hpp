@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/bounds/polytope.hpp>
+#include "bounds/polytope.hpp"
 
 namespace wheelwright::bounds {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/bounds/survey.hpp>
+#include "bounds/survey.hpp"
 
 #include <algorithm>
 #include <numeric>
 
-#include <wheelwright/bounds/box.hpp>
+#include "bounds/box.hpp"
 
 namespace wheelwright::bounds {
 namespace {

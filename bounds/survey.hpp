@@ -8,9 +8,9 @@
 #include <memory>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/interval_hull.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "bounds/box.hpp"
+#include "bounds/interval_hull.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::bounds {
 

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# wheelwright_room(NAME [FOLDER room] [PROGRAM_ONLY] [WORDS] [HEADERS h...] [SHARED h...] [SOURCES s...] [HOT s...]
+# wheelwright_room(NAME [PROGRAM_ONLY] [WORDS] [HEADERS h...] [SHARED h...] [SOURCES s...] [HOT s...]
 #                  [BATCH n] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
 #
-# One target per room: wheelwright_NAME, alias Wheelwright::NAME. Headers are seen as <wheelwright/NAME/x.hpp>
-# through one symbolic link per room in the build tree, which is also the base of the installed FILE_SET. FOLDER is for a
-# part of a room that has a target of its own, since it links what the rest should not: its headers are the room's.
-# HEADERS are installed, SHARED are for the rooms above only; what stands in neither is the room's own.
+# One target per room: wheelwright_NAME, alias Wheelwright::NAME. Sources here include a header by its path from the root of
+# the repository, "NAME/x.hpp"; programs that use the library include <wheelwright/NAME/x.hpp>, in the build tree by a header
+# that forwards to it.
+# HEADERS are installed, SHARED are for the rooms above only (tools/check_layers.py); what stands in neither is the room's own.
 # PROGRAM_ONLY serves our own programs and is not installed. In a release WORDS, which says and writes what others found, is
 # optimised for the time of compilation (-O1), other rooms at -O2, and the sources named after HOT at -O3.
 # BATCH: so many sources are compiled as one, where a dozen would take longer than 25 s.
 
 # Of what names none: the rooms are `development`.
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)
-set(WHEELWRIGHT_INCLUDE_TREE ${CMAKE_BINARY_DIR}/include)
+set(WHEELWRIGHT_FORWARDS ${CMAKE_BINARY_DIR}/include)
 set(WHEELWRIGHT_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual -Werror)
 if(CMAKE_UNITY_BUILD)
   # What stands in an unnamed namespace of one file looks like a header's to GCC.
@@ -66,14 +66,17 @@ function(wheelwright_use_precompiled target name)
 endfunction()
 
 function(wheelwright_room name)
-  cmake_parse_arguments(ROOM "PROGRAM_ONLY;WORDS" "FOLDER;BATCH" "HEADERS;SHARED;SOURCES;HOT;USES;LINK;LINK_PRIVATE" ${ARGN})
-  if(NOT ROOM_FOLDER)
-    set(ROOM_FOLDER ${name})
-  endif()
-  file(MAKE_DIRECTORY ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright)
-  file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR} ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${ROOM_FOLDER} SYMBOLIC)
-  list(TRANSFORM ROOM_HEADERS PREPEND ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${ROOM_FOLDER}/)
-  list(TRANSFORM ROOM_SHARED PREPEND ${WHEELWRIGHT_INCLUDE_TREE}/wheelwright/${ROOM_FOLDER}/)
+  cmake_parse_arguments(ROOM "PROGRAM_ONLY;WORDS" "BATCH" "HEADERS;SHARED;SOURCES;HOT;USES;LINK;LINK_PRIVATE" ${ARGN})
+  file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  foreach(header IN LISTS ROOM_HEADERS ROOM_SHARED)
+    if(NOT EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${header})
+      message(FATAL_ERROR "${folder}/CMakeLists.txt names ${header}, which is not there")
+    endif()
+  endforeach()
+  foreach(header IN LISTS ROOM_HEADERS)
+    file(CONFIGURE OUTPUT ${WHEELWRIGHT_FORWARDS}/wheelwright/${folder}/${header}
+      CONTENT "#include \"${folder}/${header}\"\n" @ONLY)
+  endforeach()
   list(TRANSFORM ROOM_USES PREPEND Wheelwright::)
 
   set(target wheelwright_${name})
@@ -99,22 +102,21 @@ function(wheelwright_room name)
     add_library(${target} INTERFACE)
   endif()
   add_library(Wheelwright::${name} ALIAS ${target})
-  target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${WHEELWRIGHT_INCLUDE_TREE} FILES ${ROOM_HEADERS})
-  if(ROOM_SHARED)
-    target_sources(${target} PRIVATE FILE_SET shared TYPE HEADERS BASE_DIRS ${WHEELWRIGHT_INCLUDE_TREE}
-      FILES ${ROOM_SHARED})
-  endif()
+  target_include_directories(${target} INTERFACE $<BUILD_INTERFACE:${WHEELWRIGHT_FORWARDS}>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_options(${target} INTERFACE "$<BUILD_INTERFACE:SHELL:-iquote ${PROJECT_SOURCE_DIR}>")
   target_compile_features(${target} ${scope} cxx_std_20)
   target_link_libraries(${target} ${scope} ${ROOM_USES} ${ROOM_LINK})
   if(ROOM_LINK_PRIVATE)
     target_link_libraries(${target} PRIVATE ${ROOM_LINK_PRIVATE})
   endif()
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERIFY_INTERFACE_HEADER_SETS ON
-    POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
   if(ROOM_PROGRAM_ONLY)
     return()
   endif()
   set_property(GLOBAL APPEND PROPERTY WHEELWRIGHT_ROOMS ${target})
-  install(TARGETS ${target} EXPORT WheelwrightTargets ARCHIVE COMPONENT development LIBRARY COMPONENT development
-    FILE_SET HEADERS COMPONENT development)
+  set_property(GLOBAL APPEND PROPERTY WHEELWRIGHT_FOLDERS ${folder})
+  list(TRANSFORM ROOM_HEADERS PREPEND ${folder}/)
+  set_property(GLOBAL APPEND PROPERTY WHEELWRIGHT_HEADERS ${ROOM_HEADERS})
+  install(TARGETS ${target} EXPORT WheelwrightTargets ARCHIVE COMPONENT development LIBRARY COMPONENT development)
 endfunction()

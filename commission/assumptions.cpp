@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/assumptions.hpp>
+#include "commission/assumptions.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/noise_budget.hpp>
+#include "commission/commission.hpp"
+#include "commission/noise_budget.hpp"
 
 namespace wheelwright::commission {
 

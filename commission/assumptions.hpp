@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include <wheelwright/core/warrant.hpp>
+#include "core/warrant.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/at_risk.hpp>
+#include "commission/at_risk.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +9,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/assumptions.hpp>
-#include <wheelwright/commission/error_estimate.hpp>
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/commission/serial_correlation.hpp>
-#include <wheelwright/commission/sum_spread.hpp>
-#include <wheelwright/core/for_all.hpp>
+#include "commission/assumptions.hpp"
+#include "commission/error_estimate.hpp"
+#include "commission/noise_budget.hpp"
+#include "commission/physical.hpp"
+#include "commission/serial_correlation.hpp"
+#include "commission/sum_spread.hpp"
+#include "core/for_all.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
+#include "commission/commission.hpp"
+#include "detector/scale_detector.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/blind_watch.hpp>
+#include "commission/blind_watch.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::commission {
 namespace {

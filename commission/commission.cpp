@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/commission.hpp>
+#include "commission/commission.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,15 +9,15 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/commission/at_risk.hpp>
-#include <wheelwright/commission/contradictions.hpp>
-#include <wheelwright/commission/fit.hpp>
-#include <wheelwright/commission/pose_at_risk.hpp>
-#include <wheelwright/commission/setting.hpp>
-#include <wheelwright/commission/two_walks.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/row_stream.hpp>
+#include "bounds/feasible_set.hpp"
+#include "commission/at_risk.hpp"
+#include "commission/contradictions.hpp"
+#include "commission/fit.hpp"
+#include "commission/pose_at_risk.hpp"
+#include "commission/setting.hpp"
+#include "commission/two_walks.hpp"
+#include "core/check.hpp"
+#include "filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 

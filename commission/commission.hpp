@@ -10,22 +10,22 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/minimax.hpp>
-#include <wheelwright/commission/assumptions.hpp>
-#include <wheelwright/commission/contradictions.hpp>
-#include <wheelwright/commission/filter_choice.hpp>
-#include <wheelwright/commission/kinematic.hpp>
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/risk_reach.hpp>
-#include <wheelwright/commission/risk_set.hpp>
-#include <wheelwright/commission/survey.hpp>
-#include <wheelwright/commission/validation.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/identify/estimate.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "bounds/feasible_set.hpp"
+#include "bounds/minimax.hpp"
+#include "commission/assumptions.hpp"
+#include "commission/contradictions.hpp"
+#include "commission/filter_choice.hpp"
+#include "commission/kinematic.hpp"
+#include "commission/noise_budget.hpp"
+#include "commission/risk_reach.hpp"
+#include "commission/risk_set.hpp"
+#include "commission/survey.hpp"
+#include "commission/validation.hpp"
+#include "core/log.hpp"
+#include "detector/online_model.hpp"
+#include "identify/estimate.hpp"
+#include "identify/least_squares.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::commission {
 

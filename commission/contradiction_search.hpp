@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <vector>
 
-#include <wheelwright/commission/contradictions.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/statistics.hpp>
+#include "commission/contradictions.hpp"
+#include "core/log.hpp"
+#include "core/statistics.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/contradictions.hpp>
+#include "commission/contradictions.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,13 +7,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/contradiction_search.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/noise_level.hpp>
+#include "commission/commission.hpp"
+#include "commission/contradiction_search.hpp"
+#include "commission/physical.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/statistics.hpp"
+#include "identify/noise_level.hpp"
 
 namespace wheelwright::commission {
 

@@ -10,11 +10,11 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/commission/evidence.hpp>
-#include <wheelwright/commission/fit.hpp>
-#include <wheelwright/commission/setting.hpp>
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/log.hpp>
+#include "commission/evidence.hpp"
+#include "commission/fit.hpp"
+#include "commission/setting.hpp"
+#include "core/interval.hpp"
+#include "core/log.hpp"
 
 namespace wheelwright::commission {
 

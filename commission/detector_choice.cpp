@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/detector_choice.hpp>
+#include "commission/detector_choice.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,14 +11,14 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/survey.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/identify/minimise_scalar.hpp>
-#include <wheelwright/model/fault_type.hpp>
+#include "commission/survey.hpp"
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/for_all.hpp"
+#include "core/limits.hpp"
+#include "filter/measurement.hpp"
+#include "identify/minimise_scalar.hpp"
+#include "model/fault_type.hpp"
 
 namespace wheelwright::commission {
 

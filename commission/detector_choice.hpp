@@ -22,7 +22,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/commission/detector_trial.hpp>
+#include "commission/detector_trial.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/detector_trial.hpp>
+#include "commission/detector_trial.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,13 +8,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/pose_at_risk.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/detector/margins.hpp>
-#include <wheelwright/detector/sum_margins.hpp>
+#include "commission/pose_at_risk.hpp"
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/limits.hpp"
+#include "core/statistics.hpp"
+#include "detector/margins.hpp"
+#include "detector/sum_margins.hpp"
 
 namespace wheelwright::commission {
 namespace {

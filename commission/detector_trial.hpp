@@ -12,12 +12,12 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/events.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "commission/commission.hpp"
+#include "core/log.hpp"
+#include "detector/events.hpp"
+#include "filter/measurement.hpp"
+#include "filter/noise.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/detector_walk.hpp>
+#include "commission/detector_walk.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/blind_watch.hpp>
+#include "commission/blind_watch.hpp"
 
 namespace wheelwright::commission {
 namespace {

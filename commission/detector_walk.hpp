@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/detector.hpp>
-#include <wheelwright/detector/isolation.hpp>
-#include <wheelwright/detector/sum_isolation.hpp>
+#include "commission/commission.hpp"
+#include "core/log.hpp"
+#include "detector/detector.hpp"
+#include "detector/isolation.hpp"
+#include "detector/sum_isolation.hpp"
 
 namespace wheelwright::commission {
 

@@ -5,10 +5,10 @@
 
 #include <Eigen/QR>
 
-#include <wheelwright/commission/contradiction_search.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/identify/time_shift.hpp>
-#include <wheelwright/identify/variable_projection.hpp>
+#include "commission/contradiction_search.hpp"
+#include "core/error.hpp"
+#include "identify/time_shift.hpp"
+#include "identify/variable_projection.hpp"
 
 namespace wheelwright::commission {
 

@@ -10,11 +10,11 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/element_filter.hpp>
-#include <wheelwright/filter/sample_weights.hpp>
+#include "bounds/box.hpp"
+#include "core/limits.hpp"
+#include "core/log.hpp"
+#include "filter/element_filter.hpp"
+#include "filter/sample_weights.hpp"
 
 namespace wheelwright::commission {
 

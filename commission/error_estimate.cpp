@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/error_estimate.hpp>
+#include "commission/error_estimate.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
+#include "commission/noise_budget.hpp"
+#include "detector/scale_detector.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <optional>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/filter/error_class.hpp>
+#include "core/log.hpp"
+#include "detector/online_model.hpp"
+#include "filter/error_class.hpp"
 
 namespace wheelwright::commission {
 

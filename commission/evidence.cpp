@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/evidence.hpp>
+#include "commission/evidence.hpp"
 
 #include <algorithm>
 #include <vector>
 
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/filter/noise.hpp>
+#include "commission/noise_budget.hpp"
+#include "core/linear_algebra.hpp"
+#include "filter/noise.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -8,11 +8,11 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/commission/fit.hpp>
-#include <wheelwright/commission/setting.hpp>
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/noise.hpp>
+#include "commission/fit.hpp"
+#include "commission/setting.hpp"
+#include "core/interval.hpp"
+#include "core/log.hpp"
+#include "filter/noise.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/filter_choice.hpp>
+#include "commission/filter_choice.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,10 +9,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/identify/minimise_scalar.hpp>
+#include "core/check.hpp"
+#include "filter/row_stream.hpp"
+#include "identify/least_squares.hpp"
+#include "identify/minimise_scalar.hpp"
 
 namespace wheelwright::commission {
 namespace {

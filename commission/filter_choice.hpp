@@ -10,11 +10,11 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/commission/filter_criterion.hpp>
-#include <wheelwright/commission/survey.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/model/model.hpp>
+#include "commission/filter_criterion.hpp"
+#include "commission/survey.hpp"
+#include "core/log.hpp"
+#include "filter/measurement.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/filter_criterion.hpp>
+#include "commission/filter_criterion.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/identify/estimate.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/identify/noise_level.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/statistics.hpp"
+#include "filter/noise.hpp"
+#include "filter/row_stream.hpp"
+#include "identify/estimate.hpp"
+#include "identify/least_squares.hpp"
+#include "identify/noise_level.hpp"
 
 namespace wheelwright::commission {
 namespace {

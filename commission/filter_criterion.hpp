@@ -9,9 +9,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/model/model.hpp>
+#include "core/log.hpp"
+#include "filter/measurement.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::commission {
 

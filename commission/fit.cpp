@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/fit.hpp>
+#include "commission/fit.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/instruments.hpp>
-#include <wheelwright/identify/noise_level.hpp>
+#include "core/error.hpp"
+#include "core/statistics.hpp"
+#include "identify/instruments.hpp"
+#include "identify/noise_level.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -7,11 +7,11 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/commission/setting.hpp>
-#include <wheelwright/commission/validation.hpp>
-#include <wheelwright/identify/estimate.hpp>
-#include <wheelwright/identify/least_squares.hpp>
+#include "bounds/polytope.hpp"
+#include "commission/setting.hpp"
+#include "commission/validation.hpp"
+#include "identify/estimate.hpp"
+#include "identify/least_squares.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/incident_watch.hpp>
+#include "commission/incident_watch.hpp"
 
 #include <algorithm>
 #include <utility>

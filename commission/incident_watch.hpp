@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/detector/incidents.hpp>
+#include "commission/detector_walk.hpp"
+#include "detector/incidents.hpp"
 
 namespace wheelwright::commission {
 

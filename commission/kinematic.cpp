@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/kinematic.hpp>
+#include "commission/kinematic.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +9,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/fit.hpp>
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/pose_origin.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/least_squares.hpp>
+#include "commission/fit.hpp"
+#include "commission/noise_budget.hpp"
+#include "commission/pose_origin.hpp"
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/statistics.hpp"
+#include "identify/least_squares.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -10,15 +10,15 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/survey.hpp>
-#include <wheelwright/commission/validation.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "bounds/feasible_set.hpp"
+#include "commission/noise_budget.hpp"
+#include "commission/survey.hpp"
+#include "commission/validation.hpp"
+#include "core/log.hpp"
+#include "detector/online_model.hpp"
+#include "filter/row_stream.hpp"
+#include "identify/least_squares.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/margin_survey.hpp>
+#include "commission/margin_survey.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
 
-#include <wheelwright/commission/risk_reach.hpp>
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/detector/odometry_faults.hpp>
-#include <wheelwright/detector/pose_margins.hpp>
-#include <wheelwright/detector/smallest_certain.hpp>
+#include "commission/risk_reach.hpp"
+#include "commission/risk_watch.hpp"
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/for_all.hpp"
+#include "detector/odometry_faults.hpp"
+#include "detector/pose_margins.hpp"
+#include "detector/smallest_certain.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/margins.hpp>
-#include <wheelwright/detector/sum_margins.hpp>
+#include "commission/commission.hpp"
+#include "core/log.hpp"
+#include "detector/margins.hpp"
+#include "detector/sum_margins.hpp"
 
 namespace wheelwright::commission {
 

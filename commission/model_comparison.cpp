@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/model_comparison.hpp>
+#include "commission/model_comparison.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/words.hpp>
+#include "bounds/polytope.hpp"
+#include "commission/physical.hpp"
+#include "core/check.hpp"
+#include "core/words.hpp"
 
 namespace wheelwright::commission {
 namespace {

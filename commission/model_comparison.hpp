@@ -18,11 +18,11 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/detector/online_model.hpp>
+#include "bounds/box.hpp"
+#include "bounds/slab_rows.hpp"
+#include "core/interval.hpp"
+#include "core/warrant.hpp"
+#include "detector/online_model.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/noise_budget.hpp>
+#include "commission/noise_budget.hpp"
 
 #include <algorithm>
 #include <cmath>

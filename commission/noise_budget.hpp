@@ -9,17 +9,17 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/minimax.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/filter/error_class.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/model/model.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "bounds/box.hpp"
+#include "bounds/minimax.hpp"
+#include "core/regression.hpp"
+#include "core/warrant.hpp"
+#include "filter/error_class.hpp"
+#include "filter/measurement.hpp"
+#include "filter/noise.hpp"
+#include "identify/least_squares.hpp"
+#include "identify/noise_level.hpp"
+#include "model/model.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/physical.hpp>
+#include "commission/physical.hpp"
 
 #include <cmath>
 
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/identify/least_squares.hpp>
+#include "core/words.hpp"
+#include "identify/least_squares.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/validation.hpp>
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "commission/validation.hpp"
+#include "core/interval.hpp"
+#include "core/regression.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/pose_at_risk.hpp>
+#include "commission/pose_at_risk.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,11 +8,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/commission/sum_spread.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/filter/measurement.hpp>
+#include "bounds/feasible_set.hpp"
+#include "commission/sum_spread.hpp"
+#include "core/regression.hpp"
+#include "core/statistics.hpp"
+#include "filter/measurement.hpp"
 
 namespace wheelwright::commission {
 namespace {

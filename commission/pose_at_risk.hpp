@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/detector/pose_sums.hpp>
+#include "commission/commission.hpp"
+#include "core/regression.hpp"
+#include "detector/pose_sums.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/pose_origin.hpp>
+#include "commission/pose_origin.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,9 +11,9 @@
 #include <fmt/format.h>
 #include <Eigen/Core>
 
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/filter/encoder.hpp>
-#include <wheelwright/identify/least_squares.hpp>
+#include "core/linear_algebra.hpp"
+#include "filter/encoder.hpp"
+#include "identify/least_squares.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <string>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/odometry_filter.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "filter/odometry_filter.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::commission {
 

@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/contradiction_search.hpp>
-#include <wheelwright/core/limits.hpp>
+#include "commission/contradiction_search.hpp"
+#include "core/limits.hpp"
 
 namespace wheelwright::commission {
 

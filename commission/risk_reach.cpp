@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/risk_reach.hpp>
+#include "commission/risk_reach.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/sum_margins.hpp>
+#include "commission/physical.hpp"
+#include "core/limits.hpp"
+#include "detector/sum_margins.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
+#include "core/log.hpp"
+#include "detector/scale_detector.hpp"
 
 namespace wheelwright::commission {
 

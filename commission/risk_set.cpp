@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/risk_set.hpp>
+#include "commission/risk_set.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,14 +8,14 @@
 #include <utility>
 #include <variant>
 
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/commission/element_walk.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/filter/element_filter.hpp>
-#include <wheelwright/filter/predictable_regressor.hpp>
-#include <wheelwright/filter/sample_weights.hpp>
+#include "bounds/slab_rows.hpp"
+#include "commission/element_walk.hpp"
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "filter/element_filter.hpp"
+#include "filter/predictable_regressor.hpp"
+#include "filter/sample_weights.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -9,13 +9,13 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/filter/error_class.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/model/model.hpp>
+#include "bounds/polytope.hpp"
+#include "core/log.hpp"
+#include "core/warrant.hpp"
+#include "filter/error_class.hpp"
+#include "filter/measurement.hpp"
+#include "filter/noise.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::commission {
 

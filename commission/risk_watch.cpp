@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/risk_watch.hpp>
+#include "commission/risk_watch.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/two_walks.hpp>
-#include <wheelwright/core/log.hpp>
+#include "commission/two_walks.hpp"
+#include "core/log.hpp"
 
 namespace wheelwright::commission {
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/pose_sums.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
+#include "core/log.hpp"
+#include "detector/pose_sums.hpp"
+#include "detector/scale_detector.hpp"
 
 namespace wheelwright::commission {
 

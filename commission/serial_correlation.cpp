@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/serial_correlation.hpp>
+#include "commission/serial_correlation.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,11 +7,11 @@
 #include <deque>
 #include <vector>
 
-#include <wheelwright/commission/element_walk.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/filter/sample_weights.hpp>
+#include "commission/element_walk.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/regression.hpp"
+#include "filter/sample_weights.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -7,10 +7,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/element_filter.hpp>
-#include <wheelwright/filter/error_class.hpp>
+#include "bounds/polytope.hpp"
+#include "core/log.hpp"
+#include "filter/element_filter.hpp"
+#include "filter/error_class.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/setting.hpp>
+#include "commission/setting.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/identify/instruments.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/model/effect_law.hpp>
+#include "commission/noise_budget.hpp"
+#include "commission/physical.hpp"
+#include "core/check.hpp"
+#include "identify/instruments.hpp"
+#include "identify/noise_level.hpp"
+#include "model/effect_law.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -10,16 +10,16 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/commission/filter_choice.hpp>
-#include <wheelwright/commission/survey.hpp>
-#include <wheelwright/commission/validation.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/identify/estimate.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "bounds/box.hpp"
+#include "commission/filter_choice.hpp"
+#include "commission/survey.hpp"
+#include "commission/validation.hpp"
+#include "core/log.hpp"
+#include "filter/measurement.hpp"
+#include "filter/noise.hpp"
+#include "filter/row_stream.hpp"
+#include "identify/estimate.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/sum_spread.hpp>
+#include "commission/sum_spread.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/detector/scale_detector.hpp>
+#include "detector/scale_detector.hpp"
 
 namespace wheelwright::commission {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/survey.hpp>
+#include "commission/survey.hpp"
 
 #include <algorithm>
 #include <array>

@@ -6,9 +6,9 @@
 #include <cstddef>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "filter/measurement.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::commission {
 

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <memory>
 
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/log.hpp>
+#include "core/for_all.hpp"
+#include "core/log.hpp"
 
 namespace wheelwright::commission {
 

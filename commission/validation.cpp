@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/validation.hpp>
+#include "commission/validation.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/statistics.hpp>
+#include "core/check.hpp"
+#include "core/statistics.hpp"
 
 namespace wheelwright::commission {
 

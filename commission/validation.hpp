@@ -7,9 +7,9 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/detector/threshold.hpp>
+#include "core/regression.hpp"
+#include "core/warrant.hpp"
+#include "detector/threshold.hpp"
 
 namespace wheelwright::commission {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::core::check {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "linear_algebra.hpp"
+#include "core/linear_algebra.hpp"
 
 #include <algorithm>
 

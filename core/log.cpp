@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/log.hpp>
+#include "core/log.hpp"
 
 #include <algorithm>
 #include <functional>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/statistics.hpp>
+#include "core/check.hpp"
+#include "core/statistics.hpp"
 
 namespace wheelwright::core {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/regression.hpp>
+#include "core/regression.hpp"
 
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::core {
 

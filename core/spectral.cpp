@@ -2,7 +2,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
-#include "linear_algebra.hpp"
+#include "core/linear_algebra.hpp"
 
 namespace wheelwright::core {
 

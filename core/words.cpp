@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/words.hpp>
+#include "core/words.hpp"
 
 namespace wheelwright::core {
 namespace {

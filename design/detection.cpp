@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/design/detection.hpp>
+#include "design/detection.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/design/risk_promise.hpp>
-#include <wheelwright/detector/events.hpp>
-#include <wheelwright/detector/fault_margin.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "design/risk_promise.hpp"
+#include "detector/events.hpp"
+#include "detector/fault_margin.hpp"
 
 namespace wheelwright::design {
 

@@ -13,9 +13,9 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/design/manoeuvre.hpp>
-#include <wheelwright/model/fault_type.hpp>
+#include "commission/commission.hpp"
+#include "design/manoeuvre.hpp"
+#include "model/fault_type.hpp"
 
 namespace wheelwright::design {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/design/manoeuvre.hpp>
+#include "design/manoeuvre.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/design/risk_promise.hpp>
-#include <wheelwright/design/stages.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "design/risk_promise.hpp"
+#include "design/stages.hpp"
 
 namespace wheelwright::design {
 namespace {

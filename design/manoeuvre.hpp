@@ -10,8 +10,8 @@
 #include <optional>
 #include <string_view>
 
-#include <wheelwright/design/plan.hpp>
-#include <wheelwright/design/subject.hpp>
+#include "design/plan.hpp"
+#include "design/subject.hpp"
 
 namespace wheelwright::design {
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/design/plan.hpp>
+#include "design/plan.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include <wheelwright/bounds/interval_hull.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
+#include "bounds/interval_hull.hpp"
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
 
 namespace wheelwright::design {
 

@@ -30,12 +30,12 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/design/subject.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "bounds/box.hpp"
+#include "core/interval.hpp"
+#include "core/log.hpp"
+#include "core/regression.hpp"
+#include "design/subject.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::design {
 

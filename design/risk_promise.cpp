@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/design/risk_promise.hpp>
+#include "design/risk_promise.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/commission/risk_set.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/fault_margin.hpp>
-#include <wheelwright/detector/sum_response.hpp>
-#include <wheelwright/filter/motion_bound.hpp>
-#include <wheelwright/filter/row_stream.hpp>
+#include "bounds/feasible_set.hpp"
+#include "commission/risk_set.hpp"
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "detector/fault_margin.hpp"
+#include "detector/sum_response.hpp"
+#include "filter/motion_bound.hpp"
+#include "filter/row_stream.hpp"
 
 namespace wheelwright::design {
 

@@ -15,8 +15,8 @@
 
 #include <vector>
 
-#include <wheelwright/design/detection.hpp>
-#include <wheelwright/design/plan.hpp>
+#include "design/detection.hpp"
+#include "design/plan.hpp"
 
 namespace wheelwright::design {
 

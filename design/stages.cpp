@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/design/stages.hpp>
+#include "design/stages.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,11 +10,11 @@
 
 #include <nlopt.hpp>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/random.hpp>
-#include <wheelwright/design/plan.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/for_all.hpp"
+#include "core/random.hpp"
+#include "design/plan.hpp"
 
 namespace wheelwright::design {
 namespace {

@@ -20,8 +20,8 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/design/plan.hpp>
-#include <wheelwright/design/subject.hpp>
+#include "design/plan.hpp"
+#include "design/subject.hpp"
 
 namespace wheelwright::design {
 

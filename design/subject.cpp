@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/design/subject.hpp>
+#include "design/subject.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,13 +10,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/commission/survey.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/design/plan.hpp>
-#include <wheelwright/filter/row_stream.hpp>
+#include "commission/noise_budget.hpp"
+#include "commission/physical.hpp"
+#include "commission/survey.hpp"
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "design/plan.hpp"
+#include "filter/row_stream.hpp"
 
 namespace wheelwright::design {
 namespace {

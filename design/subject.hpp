@@ -7,13 +7,13 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/filter/error_class.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "bounds/box.hpp"
+#include "commission/commission.hpp"
+#include "core/regression.hpp"
+#include "core/warrant.hpp"
+#include "detector/reference_motion.hpp"
+#include "filter/error_class.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::design {
 

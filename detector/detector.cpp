@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/detector.hpp>
+#include "detector/detector.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -12,10 +12,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/detector/events.hpp>
-#include <wheelwright/detector/threshold.hpp>
-#include <wheelwright/filter/row_stream.hpp>
+#include "core/check.hpp"
+#include "detector/events.hpp"
+#include "detector/threshold.hpp"
+#include "filter/row_stream.hpp"
 
 namespace wheelwright::detector {
 

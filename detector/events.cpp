@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/events.hpp>
+#include "detector/events.hpp"
 
 #include <bit>
 #include <cmath>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::detector {
 

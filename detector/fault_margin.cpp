@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/fault_margin.hpp>
+#include "detector/fault_margin.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -24,8 +24,8 @@
 
 #include <optional>
 
-#include <wheelwright/detector/fault_rows.hpp>
-#include <wheelwright/detector/threshold.hpp>
+#include "detector/fault_rows.hpp"
+#include "detector/threshold.hpp"
 
 namespace wheelwright::detector {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/fault_rows.hpp>
+#include "detector/fault_rows.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 #include <numbers>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
 
 namespace wheelwright::detector {
 namespace {

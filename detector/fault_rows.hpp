@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/filter/kernel.hpp>
-#include <wheelwright/model/fault_type.hpp>
+#include "detector/reference_motion.hpp"
+#include "filter/kernel.hpp"
+#include "model/fault_type.hpp"
 
 namespace wheelwright::detector {
 

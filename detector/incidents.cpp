@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/incidents.hpp>
+#include "detector/incidents.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 #include <utility>
 
-#include <wheelwright/core/limits.hpp>
+#include "core/limits.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/detector/events.hpp>
-#include <wheelwright/detector/isolation.hpp>
+#include "detector/events.hpp"
+#include "detector/isolation.hpp"
 
 namespace wheelwright::detector {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/isolation.hpp>
+#include "detector/isolation.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,13 +7,13 @@
 #include <limits>
 #include <utility>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/linear_program.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/detector/onset_rows.hpp>
+#include "bounds/certificate.hpp"
+#include "bounds/linear_program.hpp"
+#include "bounds/slab_rows.hpp"
+#include "core/check.hpp"
+#include "core/for_all.hpp"
+#include "core/linear_algebra.hpp"
+#include "detector/onset_rows.hpp"
 
 namespace wheelwright::detector {
 

@@ -29,10 +29,10 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/model/fault_type.hpp>
+#include "bounds/polytope.hpp"
+#include "core/interval.hpp"
+#include "detector/reference_motion.hpp"
+#include "model/fault_type.hpp"
 
 namespace wheelwright::detector {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/margins.hpp>
+#include "detector/margins.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,11 +7,11 @@
 #include <span>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/detector/events.hpp>
+#include "core/check.hpp"
+#include "core/for_all.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "detector/events.hpp"
 
 namespace wheelwright::detector {
 

@@ -13,12 +13,12 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/detector/events.hpp>
-#include <wheelwright/detector/fault_margin.hpp>
-#include <wheelwright/detector/fault_rows.hpp>
-#include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/model/fault_type.hpp>
+#include "detector/events.hpp"
+#include "detector/fault_margin.hpp"
+#include "detector/fault_rows.hpp"
+#include "detector/reference_motion.hpp"
+#include "filter/noise.hpp"
+#include "model/fault_type.hpp"
 
 namespace wheelwright::detector {
 

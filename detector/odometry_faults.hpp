@@ -7,11 +7,11 @@
 #include <cstddef>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/fault_rows.hpp>
-#include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/filter/odometry_filter.hpp>
+#include "bounds/box.hpp"
+#include "core/log.hpp"
+#include "detector/fault_rows.hpp"
+#include "detector/reference_motion.hpp"
+#include "filter/odometry_filter.hpp"
 
 namespace wheelwright::detector {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/online_model.hpp>
+#include "detector/online_model.hpp"
 
 #include <utility>
 

@@ -8,16 +8,16 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/detector/detector.hpp>
-#include <wheelwright/filter/error_class.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/filter/odometry_filter.hpp>
-#include <wheelwright/model/model.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "bounds/box.hpp"
+#include "bounds/slab_rows.hpp"
+#include "core/warrant.hpp"
+#include "detector/detector.hpp"
+#include "filter/error_class.hpp"
+#include "filter/measurement.hpp"
+#include "filter/noise.hpp"
+#include "filter/odometry_filter.hpp"
+#include "model/model.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::detector {
 

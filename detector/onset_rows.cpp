@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/onset_rows.hpp>
+#include "detector/onset_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::detector {
 namespace {

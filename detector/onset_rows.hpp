@@ -28,7 +28,7 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/detector/fault_rows.hpp>
+#include "detector/fault_rows.hpp"
 
 namespace wheelwright::detector {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/pose_margins.hpp>
+#include "detector/pose_margins.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/detector/odometry_faults.hpp>
-#include <wheelwright/detector/smallest_certain.hpp>
-#include <wheelwright/detector/sum_kernel.hpp>
+#include "detector/odometry_faults.hpp"
+#include "detector/smallest_certain.hpp"
+#include "detector/sum_kernel.hpp"
 
 namespace wheelwright::detector {
 namespace {

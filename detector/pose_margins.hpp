@@ -23,11 +23,11 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/detector/margins.hpp>
-#include <wheelwright/detector/pose_sums.hpp>
-#include <wheelwright/detector/sum_margins.hpp>
+#include "core/log.hpp"
+#include "core/regression.hpp"
+#include "detector/margins.hpp"
+#include "detector/pose_sums.hpp"
+#include "detector/sum_margins.hpp"
 
 namespace wheelwright::detector {
 

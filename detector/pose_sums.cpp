@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/pose_sums.hpp>
+#include "detector/pose_sums.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 #include <numbers>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/sum_kernel.hpp>
-#include <wheelwright/filter/kernel.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "detector/sum_kernel.hpp"
+#include "filter/kernel.hpp"
 
 namespace wheelwright::detector {
 namespace {

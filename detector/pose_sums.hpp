@@ -11,10 +11,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
-#include <wheelwright/detector/threshold.hpp>
+#include "core/log.hpp"
+#include "detector/online_model.hpp"
+#include "detector/scale_detector.hpp"
+#include "detector/threshold.hpp"
 
 namespace wheelwright::detector {
 

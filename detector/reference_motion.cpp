@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/reference_motion.hpp>
+#include "detector/reference_motion.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -9,9 +9,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/filter/regressor_filter.hpp>
+#include "core/log.hpp"
+#include "core/regression.hpp"
+#include "filter/regressor_filter.hpp"
 
 namespace wheelwright::detector {
 

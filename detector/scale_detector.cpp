@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/scale_detector.hpp>
+#include "detector/scale_detector.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/detector/sum_kernel.hpp>
-#include <wheelwright/filter/kernel.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "detector/sum_kernel.hpp"
+#include "filter/kernel.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -11,11 +11,11 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/detector/threshold.hpp>
-#include <wheelwright/filter/element_filter.hpp>
-#include <wheelwright/filter/predictable_regressor.hpp>
+#include "core/log.hpp"
+#include "detector/online_model.hpp"
+#include "detector/threshold.hpp"
+#include "filter/element_filter.hpp"
+#include "filter/predictable_regressor.hpp"
 
 namespace wheelwright::detector {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/smallest_certain.hpp>
+#include "detector/smallest_certain.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/for_all.hpp>
+#include "core/check.hpp"
+#include "core/for_all.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/margins.hpp>
-#include <wheelwright/detector/sum_margins.hpp>
-#include <wheelwright/detector/sum_response.hpp>
+#include "core/limits.hpp"
+#include "detector/margins.hpp"
+#include "detector/sum_margins.hpp"
+#include "detector/sum_response.hpp"
 
 namespace wheelwright::detector {
 

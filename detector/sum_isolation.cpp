@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/sum_isolation.hpp>
+#include "detector/sum_isolation.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <vector>
 
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/onset_rows.hpp>
+#include "core/for_all.hpp"
+#include "core/limits.hpp"
+#include "detector/onset_rows.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <cstddef>
 
-#include <wheelwright/detector/isolation.hpp>
-#include <wheelwright/detector/sum_response.hpp>
+#include "detector/isolation.hpp"
+#include "detector/sum_response.hpp"
 
 namespace wheelwright::detector {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/sum_margins.hpp>
+#include "detector/sum_margins.hpp"
 
 #include <algorithm>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/detector/smallest_certain.hpp>
+#include "core/check.hpp"
+#include "detector/smallest_certain.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/detector/margins.hpp>
-#include <wheelwright/detector/sum_response.hpp>
+#include "detector/margins.hpp"
+#include "detector/sum_response.hpp"
 
 namespace wheelwright::detector {
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/sum_response.hpp>
+#include "detector/sum_response.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -33,12 +33,12 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/fault_rows.hpp>
-#include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
-#include <wheelwright/detector/sum_kernel.hpp>
+#include "core/log.hpp"
+#include "detector/fault_rows.hpp"
+#include "detector/online_model.hpp"
+#include "detector/reference_motion.hpp"
+#include "detector/scale_detector.hpp"
+#include "detector/sum_kernel.hpp"
 
 namespace wheelwright::detector {
 

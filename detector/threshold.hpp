@@ -9,10 +9,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/bounds/support_table.hpp>
-#include <wheelwright/bounds/support_walk.hpp>
+#include "bounds/box.hpp"
+#include "bounds/polytope.hpp"
+#include "bounds/support_table.hpp"
+#include "bounds/support_walk.hpp"
 
 namespace wheelwright::detector {
 

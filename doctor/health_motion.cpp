@@ -6,14 +6,14 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/contradictions.hpp>
-#include <wheelwright/commission/fit.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/commission/setting.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/inference/identifiability.hpp>
+#include "commission/contradictions.hpp"
+#include "commission/fit.hpp"
+#include "commission/physical.hpp"
+#include "commission/setting.hpp"
+#include "core/error.hpp"
+#include "core/statistics.hpp"
+#include "doctor/log_health.hpp"
+#include "inference/identifiability.hpp"
 
 namespace wheelwright::doctor {
 namespace {

@@ -11,11 +11,11 @@
 #include <fmt/format.h>
 #include <Eigen/Dense>
 
-#include <wheelwright/commission/pose_origin.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/inference/kinematic_calibration.hpp>
+#include "commission/pose_origin.hpp"
+#include "core/error.hpp"
+#include "core/statistics.hpp"
+#include "doctor/log_health.hpp"
+#include "inference/kinematic_calibration.hpp"
 
 namespace wheelwright::doctor {
 namespace {

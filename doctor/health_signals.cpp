@@ -7,11 +7,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/filter/encoder.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/inference/noise_levels.hpp>
+#include "core/error.hpp"
+#include "doctor/log_health.hpp"
+#include "filter/encoder.hpp"
+#include "identify/noise_level.hpp"
+#include "inference/noise_levels.hpp"
 
 namespace wheelwright::doctor {
 namespace {

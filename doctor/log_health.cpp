@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/doctor/log_health.hpp>
+#include "doctor/log_health.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/core/words.hpp>
+#include "core/check.hpp"
+#include "core/for_all.hpp"
+#include "core/statistics.hpp"
+#include "core/words.hpp"
 
 namespace wheelwright::doctor {
 namespace {

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/interval.hpp"
+#include "core/log.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::doctor {
 

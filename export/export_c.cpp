@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/export/export_c.hpp>
+#include "export/export_c.hpp"
 
 #include <algorithm>
 #include <array>
@@ -13,12 +13,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/export/export_c_filter.hpp>
-#include <wheelwright/export/export_c_sums.hpp>
-#include <wheelwright/export/export_c_text.hpp>
+#include "core/error.hpp"
+#include "core/limits.hpp"
+#include "core/words.hpp"
+#include "export/export_c_filter.hpp"
+#include "export/export_c_sums.hpp"
+#include "export/export_c_text.hpp"
 
 namespace wheelwright::exporter {
 namespace {

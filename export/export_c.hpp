@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include <wheelwright/detector/detector.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
+#include "detector/detector.hpp"
+#include "detector/scale_detector.hpp"
 
 namespace wheelwright::exporter {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/export/export_c_filter.hpp>
+#include "export/export_c_filter.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/export/export_c_text.hpp>
+#include "core/error.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "export/export_c_text.hpp"
 
 namespace wheelwright::exporter::c_text {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/filter/regressor_filter.hpp>
+#include "filter/regressor_filter.hpp"
 
 namespace wheelwright::exporter::c_text {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/export/export_c_sums.hpp>
+#include "export/export_c_sums.hpp"
 
 #include <cmath>
 #include <string_view>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/detector/sum_kernel.hpp>
-#include <wheelwright/export/export_c_text.hpp>
+#include "detector/sum_kernel.hpp"
+#include "export/export_c_text.hpp"
 
 namespace wheelwright::exporter::c_text {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include <wheelwright/detector/scale_detector.hpp>
-#include <wheelwright/export/export_c_filter.hpp>
+#include "detector/scale_detector.hpp"
+#include "export/export_c_filter.hpp"
 
 namespace wheelwright::exporter::c_text {
 

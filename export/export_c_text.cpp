@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/export/export_c_text.hpp>
+#include "export/export_c_text.hpp"
 
 #include <array>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/words.hpp>
+#include "core/check.hpp"
+#include "core/words.hpp"
 
 namespace wheelwright::exporter::c_text {
 

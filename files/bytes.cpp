@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/files/bytes.hpp>
+#include "files/bytes.hpp"
 
 #include <unistd.h>
 
@@ -22,8 +22,8 @@
 #include <zlib.h>
 #include <zstd.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::files {
 

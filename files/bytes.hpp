@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/files/temporary.hpp>
+#include "files/temporary.hpp"
 
 struct XXH64_state_s;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/files/place.hpp>
+#include "files/place.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +11,8 @@
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::files {
 

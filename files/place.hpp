@@ -15,7 +15,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::files {
 

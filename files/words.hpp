@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/files/json.hpp>
+#include "core/words.hpp"
+#include "files/json.hpp"
 
 namespace wheelwright::files {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/files/xml_text.hpp>
+#include "files/xml_text.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::files {
 namespace {

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/files/place.hpp>
+#include "files/place.hpp"
 
 namespace wheelwright::files {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/effort_correction.hpp>
+#include "filter/effort_correction.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/model/effect_law.hpp>
+#include "core/check.hpp"
+#include "model/effect_law.hpp"
 
 namespace wheelwright::filter {
 namespace {

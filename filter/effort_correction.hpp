@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/model/robot.hpp>
+#include "model/robot.hpp"
 
 namespace wheelwright::filter {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/element_filter.hpp>
+#include "filter/element_filter.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/filter/in_order.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "filter/in_order.hpp"
 
 namespace wheelwright::filter {
 namespace {

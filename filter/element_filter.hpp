@@ -10,11 +10,11 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/filter/effort_correction.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/motion_bound.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/model/model.hpp>
+#include "filter/effort_correction.hpp"
+#include "filter/measurement.hpp"
+#include "filter/motion_bound.hpp"
+#include "filter/noise.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::filter {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/error_class.hpp>
+#include "filter/error_class.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::filter {
 

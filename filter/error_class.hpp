@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/filter/sample_weights.hpp>
+#include "core/limits.hpp"
+#include "filter/sample_weights.hpp"
 
 namespace wheelwright::filter {
 

@@ -16,7 +16,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/filter/measurement.hpp>
+#include "filter/measurement.hpp"
 
 namespace wheelwright::filter {
 

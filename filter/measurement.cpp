@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/measurement.hpp>
+#include "filter/measurement.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/filter/encoder.hpp>
+#include "core/check.hpp"
+#include "core/statistics.hpp"
+#include "core/words.hpp"
+#include "filter/encoder.hpp"
 
 namespace wheelwright::filter {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/effort_correction.hpp>
-#include <wheelwright/model/model.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "filter/effort_correction.hpp"
+#include "model/model.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::filter {
 

@@ -7,8 +7,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/model/model.hpp>
+#include "core/interval.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::filter {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/noise.hpp>
+#include "filter/noise.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 #include <numbers>
 #include <optional>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/kernel.hpp>
+#include "core/check.hpp"
+#include "filter/kernel.hpp"
 
 namespace wheelwright::filter {
 namespace {

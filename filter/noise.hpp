@@ -9,10 +9,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/motion_bound.hpp>
-#include <wheelwright/model/model.hpp>
+#include "core/regression.hpp"
+#include "filter/measurement.hpp"
+#include "filter/motion_bound.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::filter {
 

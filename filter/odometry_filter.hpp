@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/regressor_filter.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "filter/measurement.hpp"
+#include "filter/regressor_filter.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::filter {
 

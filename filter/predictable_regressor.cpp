@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/predictable_regressor.hpp>
+#include "filter/predictable_regressor.hpp"
 
 #include <cmath>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/kernel.hpp>
-#include <wheelwright/filter/sample_weights.hpp>
+#include "core/check.hpp"
+#include "filter/kernel.hpp"
+#include "filter/sample_weights.hpp"
 
 namespace wheelwright::filter {
 

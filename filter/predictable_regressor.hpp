@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <vector>
 
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/filter/element_filter.hpp>
+#include "core/regression.hpp"
+#include "filter/element_filter.hpp"
 
 namespace wheelwright::filter {
 

@@ -9,12 +9,12 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/filter/element_filter.hpp>
-#include <wheelwright/filter/kernel.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/model/model.hpp>
+#include "core/regression.hpp"
+#include "filter/element_filter.hpp"
+#include "filter/kernel.hpp"
+#include "filter/measurement.hpp"
+#include "filter/noise.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::filter {
 

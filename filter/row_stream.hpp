@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/filter/odometry_filter.hpp>
-#include <wheelwright/filter/regressor_filter.hpp>
+#include "core/check.hpp"
+#include "core/log.hpp"
+#include "core/regression.hpp"
+#include "filter/odometry_filter.hpp"
+#include "filter/regressor_filter.hpp"
 
 namespace wheelwright::filter {
 

@@ -9,8 +9,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/filter/element_filter.hpp>
+#include "core/regression.hpp"
+#include "filter/element_filter.hpp"
 
 namespace wheelwright::filter {
 

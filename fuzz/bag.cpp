@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "log.hpp"
+#include "fuzz/log.hpp"
 
 using namespace wheelwright;
 

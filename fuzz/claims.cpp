@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-#include <wheelwright/results/comparison_json.hpp>
-#include <wheelwright/results/model_check.hpp>
-#include <wheelwright/results/model_file.hpp>
-
-#include "fuzz.hpp"
+#include "core/log.hpp"
+#include "fuzz/fuzz.hpp"
+#include "logs/recorded_log.hpp"
+#include "results/comparison_json.hpp"
+#include "results/model_check.hpp"
+#include "results/model_file.hpp"
 
 using namespace wheelwright;
 

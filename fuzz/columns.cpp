@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "logs/log_file.hpp"
+#include "robots/robot_file.hpp"
 
 using namespace wheelwright;
 

@@ -3,11 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/robots/controller_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/robot_origin.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "robots/controller_file.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/robot_origin.hpp"
 
 using namespace wheelwright;
 

@@ -4,9 +4,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/files/bytes.hpp>
-
-#include "log.hpp"
+#include "files/bytes.hpp"
+#include "fuzz/log.hpp"
 
 using namespace wheelwright;
 

@@ -4,10 +4,9 @@
 #include <cstring>
 #include <memory>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/logs/csv.hpp>
-
-#include "fuzz.hpp"
+#include "files/bytes.hpp"
+#include "fuzz/fuzz.hpp"
+#include "logs/csv.hpp"
 
 using namespace wheelwright;
 

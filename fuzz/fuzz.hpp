@@ -17,7 +17,7 @@
 #include <string_view>
 #include <system_error>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::fuzz {
 

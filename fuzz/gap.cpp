@@ -4,13 +4,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/gap/discrimination.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/results/gap_json.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "fuzz.hpp"
+#include "filter/measurement.hpp"
+#include "fuzz/fuzz.hpp"
+#include "gap/discrimination.hpp"
+#include "gap/drive.hpp"
+#include "results/gap_json.hpp"
+#include "sim/simulation.hpp"
 
 using namespace wheelwright;
 

@@ -4,9 +4,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/logs/log_file.hpp>
-
-#include "log.hpp"
+#include "fuzz/log.hpp"
+#include "logs/log_file.hpp"
 
 using namespace wheelwright;
 

@@ -9,11 +9,10 @@
 #include <memory>
 #include <string>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/log_file.hpp>
-
-#include "fuzz.hpp"
+#include "core/log.hpp"
+#include "fuzz/fuzz.hpp"
+#include "logs/csv.hpp"
+#include "logs/log_file.hpp"
 
 namespace wheelwright::fuzz {
 

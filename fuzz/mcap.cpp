@@ -7,7 +7,7 @@
 
 #include <zlib.h>
 
-#include "log.hpp"
+#include "fuzz/log.hpp"
 
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);
 

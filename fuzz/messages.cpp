@@ -2,9 +2,8 @@
 #include <algorithm>
 #include <vector>
 
-#include <wheelwright/logs/ros_messages.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "logs/ros_messages.hpp"
 
 using namespace wheelwright;
 

@@ -2,9 +2,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include <wheelwright/logs/bag_files.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "logs/bag_files.hpp"
 
 using namespace wheelwright;
 

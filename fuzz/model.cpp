@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/robots/online_model_file.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "robots/online_model_file.hpp"
 
 using namespace wheelwright;
 

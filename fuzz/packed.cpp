@@ -3,9 +3,8 @@
 #include <optional>
 #include <string>
 
-#include <wheelwright/files/bytes.hpp>
-
-#include "fuzz.hpp"
+#include "files/bytes.hpp"
+#include "fuzz/fuzz.hpp"
 
 using namespace wheelwright;
 

@@ -4,9 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/results/fleet_json.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "results/fleet_json.hpp"
 
 using namespace wheelwright;
 

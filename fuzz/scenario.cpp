@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "fuzz.hpp"
+#include "core/error.hpp"
+#include "fuzz/fuzz.hpp"
+#include "results/scenario_file.hpp"
+#include "sim/simulation.hpp"
 
 using namespace wheelwright;
 

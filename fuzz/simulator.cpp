@@ -3,9 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/robots/simulator_file.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "robots/simulator_file.hpp"
 
 using namespace wheelwright;
 

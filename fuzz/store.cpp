@@ -3,10 +3,9 @@
 #include <map>
 #include <string>
 
-#include <wheelwright/logs/database.hpp>
-#include <wheelwright/results/result_store.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "logs/database.hpp"
+#include "results/result_store.hpp"
 
 using namespace wheelwright;
 

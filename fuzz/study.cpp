@@ -2,9 +2,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include <wheelwright/results/study_json.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "results/study_json.hpp"
 
 using namespace wheelwright;
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/robots/robot_description.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/robot_origin.hpp>
-
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
+#include "robots/robot_description.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/robot_origin.hpp"
 
 using namespace wheelwright;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/block_gram.hpp>
+#include "gap/block_gram.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 #include <map>
 #include <numeric>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
+#include "core/check.hpp"
+#include "core/for_all.hpp"
+#include "core/linear_algebra.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/candidate.hpp>
+#include "gap/candidate.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include <random>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/for_all.hpp>
+#include "core/check.hpp"
+#include "core/for_all.hpp"
 
 namespace wheelwright::gap {
 namespace {

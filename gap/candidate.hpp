@@ -12,8 +12,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/drive.hpp>
+#include "gap/block_gram.hpp"
+#include "gap/drive.hpp"
 
 namespace wheelwright::gap {
 

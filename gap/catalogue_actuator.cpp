@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/gap/effect.hpp>
+#include "gap/effect.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include <wheelwright/gap/effect.hpp>
+#include "gap/effect.hpp"
 
 namespace wheelwright::gap {
 namespace {

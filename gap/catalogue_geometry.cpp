@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
+#include "gap/effect.hpp"
+#include "gap/gap_rows.hpp"
 
 namespace wheelwright::gap {
 namespace {

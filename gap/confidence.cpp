@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/confidence.hpp>
+#include "gap/confidence.hpp"
 
 #include <algorithm>
 

@@ -3,7 +3,7 @@
 /// How likely what a diagnosis says is, by what became of others like it.
 #pragma once
 
-#include <wheelwright/gap/diagnosis.hpp>
+#include "gap/diagnosis.hpp"
 
 namespace wheelwright::gap {
 

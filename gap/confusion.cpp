@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/confusion.hpp>
+#include "gap/confusion.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include <wheelwright/gap/block_gram.hpp>
+#include "gap/block_gram.hpp"
 
 namespace wheelwright::gap {
 namespace {

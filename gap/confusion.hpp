@@ -10,9 +10,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/gap/candidate.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/effect.hpp>
+#include "gap/candidate.hpp"
+#include "gap/diagnosis.hpp"
+#include "gap/effect.hpp"
 
 namespace wheelwright::gap {
 

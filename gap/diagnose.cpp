@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/diagnose.hpp>
+#include "gap/diagnose.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,21 +10,21 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/gap/confidence.hpp>
-#include <wheelwright/gap/confusion.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/effort_units.hpp>
-#include <wheelwright/gap/estimates.hpp>
-#include <wheelwright/gap/fast_band.hpp>
-#include <wheelwright/gap/further_drive.hpp>
-#include <wheelwright/gap/improved_robot.hpp>
-#include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/gap/regimes.hpp>
-#include <wheelwright/gap/rollout.hpp>
-#include <wheelwright/gap/selection.hpp>
-#include <wheelwright/gap/shrink.hpp>
-#include <wheelwright/gap/where.hpp>
+#include "core/words.hpp"
+#include "gap/confidence.hpp"
+#include "gap/confusion.hpp"
+#include "gap/drive.hpp"
+#include "gap/effort_units.hpp"
+#include "gap/estimates.hpp"
+#include "gap/fast_band.hpp"
+#include "gap/further_drive.hpp"
+#include "gap/improved_robot.hpp"
+#include "gap/prepared.hpp"
+#include "gap/regimes.hpp"
+#include "gap/rollout.hpp"
+#include "gap/selection.hpp"
+#include "gap/shrink.hpp"
+#include "gap/where.hpp"
 
 namespace wheelwright::gap {
 namespace {

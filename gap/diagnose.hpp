@@ -11,11 +11,11 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
-#include <wheelwright/gap/selection.hpp>
+#include "core/log.hpp"
+#include "gap/diagnosis.hpp"
+#include "gap/effect.hpp"
+#include "gap/gap_rows.hpp"
+#include "gap/selection.hpp"
 
 namespace wheelwright::gap {
 

@@ -13,10 +13,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "gap/effect.hpp"
+#include "gap/gap_rows.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::gap {
 

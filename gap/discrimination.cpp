@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/discrimination.hpp>
+#include "gap/discrimination.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,13 +8,12 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <wheelwright/commission/noise_budget.hpp>
-
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/drive.hpp>
+#include "commission/noise_budget.hpp"
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "filter/noise.hpp"
+#include "gap/block_gram.hpp"
+#include "gap/drive.hpp"
 
 namespace wheelwright::gap {
 namespace {

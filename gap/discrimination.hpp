@@ -30,10 +30,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/design/subject.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
+#include "design/subject.hpp"
+#include "gap/drive.hpp"
+#include "gap/effect.hpp"
+#include "gap/gap_rows.hpp"
 
 namespace wheelwright::gap {
 

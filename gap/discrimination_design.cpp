@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/discrimination_design.hpp>
+#include "gap/discrimination_design.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/random.hpp>
-#include <wheelwright/design/stages.hpp>
-#include <wheelwright/gap/effort_units.hpp>
-#include <wheelwright/gap/further_drive.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/random.hpp"
+#include "design/stages.hpp"
+#include "gap/effort_units.hpp"
+#include "gap/further_drive.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/drive.hpp>
+#include "gap/drive.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/statistics.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/statistics.hpp"
 
 namespace wheelwright::gap {
 namespace {

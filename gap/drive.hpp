@@ -12,10 +12,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/model/model.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "filter/measurement.hpp"
+#include "model/model.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::gap {
 

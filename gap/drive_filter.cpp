@@ -7,9 +7,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/filter/kernel.hpp>
-#include <wheelwright/gap/drive.hpp>
+#include "core/check.hpp"
+#include "filter/kernel.hpp"
+#include "gap/drive.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/effect.hpp>
+#include "gap/effect.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,10 +10,10 @@
 #include <string>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/filter/kernel.hpp>
-#include <wheelwright/model/effect_law.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "filter/kernel.hpp"
+#include "model/effect_law.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -12,8 +12,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/gap/drive.hpp>
+#include "core/interval.hpp"
+#include "gap/drive.hpp"
 
 namespace wheelwright::gap {
 

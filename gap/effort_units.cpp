@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/effort_units.hpp>
+#include "gap/effort_units.hpp"
 
 #include <algorithm>
 #include <array>
 #include <string_view>
 #include <utility>
 
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/error.hpp>
+#include "commission/physical.hpp"
+#include "core/error.hpp"
 
 namespace wheelwright::gap {
 namespace {

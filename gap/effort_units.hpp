@@ -6,10 +6,10 @@
 #include <map>
 #include <string>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "gap/diagnosis.hpp"
+#include "gap/drive.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::gap {
 

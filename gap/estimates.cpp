@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/estimates.hpp>
+#include "gap/estimates.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -9,9 +9,9 @@
 #include <string>
 #include <utility>
 
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/design/stages.hpp>
+#include "core/linear_algebra.hpp"
+#include "core/statistics.hpp"
+#include "design/stages.hpp"
 
 namespace wheelwright::gap {
 namespace {

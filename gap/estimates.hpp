@@ -10,9 +10,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/identify/variable_projection.hpp>
+#include "gap/diagnosis.hpp"
+#include "gap/prepared.hpp"
+#include "identify/variable_projection.hpp"
 
 namespace wheelwright::gap {
 

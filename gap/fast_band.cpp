@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/fast_band.hpp>
+#include "gap/fast_band.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 #include <span>
 #include <utility>
 
-#include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/drive.hpp>
+#include "gap/block_gram.hpp"
+#include "gap/drive.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/gap/gap_rows.hpp>
-#include <wheelwright/gap/prepared.hpp>
+#include "gap/gap_rows.hpp"
+#include "gap/prepared.hpp"
 
 namespace wheelwright::gap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/further_drive.hpp>
+#include "gap/further_drive.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,16 +9,16 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/random.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/design/stages.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/gap/estimates.hpp>
-#include <wheelwright/gap/prepared.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/random.hpp"
+#include "core/words.hpp"
+#include "design/stages.hpp"
+#include "filter/measurement.hpp"
+#include "gap/discrimination_design.hpp"
+#include "gap/estimates.hpp"
+#include "gap/prepared.hpp"
 
 namespace wheelwright::gap {
 namespace {

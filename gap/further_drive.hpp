@@ -10,18 +10,18 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/design/plan.hpp>
-#include <wheelwright/design/subject.hpp>
-#include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/candidate.hpp>
-#include <wheelwright/gap/confusion.hpp>
-#include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "design/plan.hpp"
+#include "design/subject.hpp"
+#include "gap/block_gram.hpp"
+#include "gap/candidate.hpp"
+#include "gap/confusion.hpp"
+#include "gap/diagnose.hpp"
+#include "gap/diagnosis.hpp"
+#include "gap/discrimination_design.hpp"
+#include "gap/drive.hpp"
+#include "gap/prepared.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::gap {
 

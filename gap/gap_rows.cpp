@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/gap_rows.hpp>
+#include "gap/gap_rows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,11 +7,11 @@
 #include <set>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/gap/drive.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/for_all.hpp"
+#include "core/statistics.hpp"
+#include "gap/drive.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -11,9 +11,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/candidate.hpp>
-#include <wheelwright/gap/effect.hpp>
+#include "gap/block_gram.hpp"
+#include "gap/candidate.hpp"
+#include "gap/effect.hpp"
 
 namespace wheelwright::gap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/improved_robot.hpp>
+#include "gap/improved_robot.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 #include <string_view>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/model/effect_law.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/linear_algebra.hpp"
+#include "model/effect_law.hpp"
 
 namespace wheelwright::gap {
 

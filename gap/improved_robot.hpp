@@ -9,10 +9,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/interval.hpp"
+#include "gap/drive.hpp"
+#include "gap/gap_rows.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::gap {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/named_rivals.hpp>
+#include "gap/named_rivals.hpp"
 
 #include <algorithm>
 #include <set>
 #include <utility>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/design/stages.hpp>
-#include <wheelwright/gap/further_drive.hpp>
+#include "core/error.hpp"
+#include "design/stages.hpp"
+#include "gap/further_drive.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/design/manoeuvre.hpp>
-#include <wheelwright/gap/discrimination.hpp>
+#include "design/manoeuvre.hpp"
+#include "gap/discrimination.hpp"
 
 namespace wheelwright::gap {
 

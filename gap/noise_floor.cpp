@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/noise_floor.hpp>
+#include "gap/noise_floor.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
+#include "core/statistics.hpp"
+#include "gap/drive.hpp"
+#include "gap/gap_rows.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
+#include "gap/drive.hpp"
+#include "gap/gap_rows.hpp"
 
 namespace wheelwright::gap {
 

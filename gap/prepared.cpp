@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/prepared.hpp>
+#include "gap/prepared.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,13 +10,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/noise_floor.hpp>
-#include <wheelwright/gap/selection.hpp>
+#include "core/error.hpp"
+#include "core/linear_algebra.hpp"
+#include "filter/measurement.hpp"
+#include "gap/drive.hpp"
+#include "gap/effect.hpp"
+#include "gap/noise_floor.hpp"
+#include "gap/selection.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -9,12 +9,12 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/effort_units.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
+#include "core/log.hpp"
+#include "gap/diagnose.hpp"
+#include "gap/diagnosis.hpp"
+#include "gap/drive.hpp"
+#include "gap/effort_units.hpp"
+#include "gap/gap_rows.hpp"
 
 namespace wheelwright::gap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/regimes.hpp>
+#include "gap/regimes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,11 +9,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/gap/drive.hpp>
+#include "bounds/feasible_set.hpp"
+#include "core/check.hpp"
+#include "core/regression.hpp"
+#include "core/statistics.hpp"
+#include "gap/drive.hpp"
 
 namespace wheelwright::gap {
 namespace {

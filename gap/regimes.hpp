@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/drive.hpp>
+#include "bounds/box.hpp"
+#include "gap/diagnosis.hpp"
+#include "gap/drive.hpp"
 
 namespace wheelwright::gap {
 

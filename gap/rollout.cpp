@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/rollout.hpp>
+#include "gap/rollout.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,12 @@
 #include <random>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/model/effect_law.hpp>
-#include <wheelwright/sim/drivetrain.hpp>
-#include <wheelwright/sim/plant.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "core/check.hpp"
+#include "core/for_all.hpp"
+#include "model/effect_law.hpp"
+#include "sim/drivetrain.hpp"
+#include "sim/plant.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -10,8 +10,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "gap/drive.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::gap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/selection.hpp>
+#include "gap/selection.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,10 @@
 #include <set>
 #include <string>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/candidate.hpp>
+#include "core/check.hpp"
+#include "core/statistics.hpp"
+#include "gap/block_gram.hpp"
+#include "gap/candidate.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/gap/candidate.hpp>
+#include "gap/candidate.hpp"
 
 namespace wheelwright::gap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/shrink.hpp>
+#include "gap/shrink.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,17 +7,17 @@
 #include <limits>
 #include <utility>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/for_all.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
-#include <wheelwright/gap/improved_robot.hpp>
-#include <wheelwright/gap/noise_floor.hpp>
-#include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/sim/plant.hpp>
+#include "commission/commission.hpp"
+#include "core/error.hpp"
+#include "core/for_all.hpp"
+#include "core/statistics.hpp"
+#include "gap/block_gram.hpp"
+#include "gap/gap_rows.hpp"
+#include "gap/improved_robot.hpp"
+#include "gap/noise_floor.hpp"
+#include "gap/prepared.hpp"
+#include "identify/noise_level.hpp"
+#include "sim/plant.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/gap/candidate.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/gap/rollout.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "gap/candidate.hpp"
+#include "gap/diagnosis.hpp"
+#include "gap/prepared.hpp"
+#include "gap/rollout.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::gap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/simulator_change.hpp>
+#include "gap/simulator_change.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/model/effect_law.hpp>
+#include "core/check.hpp"
+#include "model/effect_law.hpp"
 
 namespace wheelwright::gap {
 

@@ -7,10 +7,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/model/simulator_change.hpp>
+#include "gap/diagnosis.hpp"
+#include "gap/drive.hpp"
+#include "model/robot.hpp"
+#include "model/simulator_change.hpp"
 
 namespace wheelwright::gap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/where.hpp>
+#include "gap/where.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,13 +14,13 @@
 #include <fmt/format.h>
 #include <unsupported/Eigen/FFT>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/gap/candidate.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/identify/moments.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/log.hpp"
+#include "core/statistics.hpp"
+#include "gap/candidate.hpp"
+#include "gap/drive.hpp"
+#include "identify/moments.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -9,9 +9,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/regimes.hpp>
+#include "gap/diagnosis.hpp"
+#include "gap/drive.hpp"
+#include "gap/regimes.hpp"
 
 namespace wheelwright::gap {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/estimate.hpp>
+#include "identify/estimate.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 #include <fmt/format.h>
 #include <Eigen/Core>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/moments.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/statistics.hpp"
+#include "identify/moments.hpp"
 
 namespace wheelwright::identify {
 namespace {

@@ -14,7 +14,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/identify/moments.hpp>
+#include "identify/moments.hpp"
 
 namespace wheelwright::identify {
 

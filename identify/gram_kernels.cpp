@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/gram_kernels.hpp>
+#include "identify/gram_kernels.hpp"
 
-#include <wheelwright/core/vector_units.hpp>
-#include <wheelwright/identify/gram_kernels_impl.hpp>
+#include "core/vector_units.hpp"
+#include "identify/gram_kernels_impl.hpp"
 
 namespace wheelwright::identify::gram_kernels {
 

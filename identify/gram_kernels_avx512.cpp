@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/gram_kernels_impl.hpp>
+#include "identify/gram_kernels_impl.hpp"
 
 namespace wheelwright::identify::gram_kernels {
 namespace {

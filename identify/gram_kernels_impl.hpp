@@ -7,7 +7,7 @@
 
 #include <cstdint>
 
-#include <wheelwright/identify/gram_kernels.hpp>
+#include "identify/gram_kernels.hpp"
 
 namespace wheelwright::identify::gram_kernels {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/instruments.hpp>
+#include "identify/instruments.hpp"
 
 #include <cmath>
 #include <utility>
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
 
 namespace wheelwright::identify {
 namespace {

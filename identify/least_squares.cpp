@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/least_squares.hpp>
+#include "identify/least_squares.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
 
 namespace wheelwright::identify {
 namespace {

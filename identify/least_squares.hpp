@@ -10,8 +10,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/identify/moments.hpp>
+#include "core/regression.hpp"
+#include "identify/moments.hpp"
 
 namespace wheelwright::identify {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/moments.hpp>
+#include "identify/moments.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
 
 namespace wheelwright::identify {
 

@@ -11,8 +11,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/identify/gram_kernels.hpp>
+#include "core/regression.hpp"
+#include "identify/gram_kernels.hpp"
 
 namespace wheelwright::identify {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/noise_level.hpp>
+#include "identify/noise_level.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/statistics.hpp>
+#include "core/check.hpp"
+#include "core/statistics.hpp"
 
 namespace wheelwright::identify {
 namespace {

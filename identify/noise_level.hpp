@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/identify/least_squares.hpp>
+#include "core/log.hpp"
+#include "identify/least_squares.hpp"
 
 namespace wheelwright::identify {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/time_shift.hpp>
+#include "identify/time_shift.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <ceres/jet.h>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::identify {
 namespace {

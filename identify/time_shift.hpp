@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <vector>
 
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/identify/variable_projection.hpp>
+#include "core/regression.hpp"
+#include "identify/variable_projection.hpp"
 
 namespace wheelwright::identify {
 

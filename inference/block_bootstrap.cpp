@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/block_bootstrap.hpp>
+#include "inference/block_bootstrap.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/random.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/random.hpp"
 
 namespace wheelwright::inference {
 namespace {

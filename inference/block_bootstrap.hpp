@@ -10,8 +10,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/identify/estimate.hpp>
-#include <wheelwright/identify/moments.hpp>
+#include "identify/estimate.hpp"
+#include "identify/moments.hpp"
 
 namespace wheelwright::inference {
 

@@ -11,8 +11,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/identify/least_squares.hpp>
+#include "core/interval.hpp"
+#include "identify/least_squares.hpp"
 
 namespace wheelwright::inference {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/identifiability.hpp>
+#include "inference/identifiability.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/words.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/words.hpp"
 
 namespace wheelwright::inference {
 

@@ -12,8 +12,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/identify/moments.hpp>
+#include "identify/least_squares.hpp"
+#include "identify/moments.hpp"
 
 namespace wheelwright::inference {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/identification.hpp>
+#include "inference/identification.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,14 +9,14 @@
 #include <ceres/jet.h>
 #include <fmt/format.h>
 
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/identify/time_shift.hpp>
-#include <wheelwright/inference/constrained.hpp>
+#include "commission/noise_budget.hpp"
+#include "commission/physical.hpp"
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/linear_algebra.hpp"
+#include "identify/noise_level.hpp"
+#include "identify/time_shift.hpp"
+#include "inference/constrained.hpp"
 
 namespace wheelwright::inference {
 namespace {

@@ -12,17 +12,17 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/commission/fit.hpp>
-#include <wheelwright/commission/setting.hpp>
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/regressor_filter.hpp>
-#include <wheelwright/identify/variable_projection.hpp>
-#include <wheelwright/inference/identifiability.hpp>
-#include <wheelwright/inference/kinematic_calibration.hpp>
-#include <wheelwright/inference/noise_levels.hpp>
-#include <wheelwright/inference/regions.hpp>
-#include <wheelwright/inference/robust.hpp>
+#include "commission/fit.hpp"
+#include "commission/setting.hpp"
+#include "core/interval.hpp"
+#include "core/log.hpp"
+#include "filter/regressor_filter.hpp"
+#include "identify/variable_projection.hpp"
+#include "inference/identifiability.hpp"
+#include "inference/kinematic_calibration.hpp"
+#include "inference/noise_levels.hpp"
+#include "inference/regions.hpp"
+#include "inference/robust.hpp"
 
 namespace wheelwright::inference {
 

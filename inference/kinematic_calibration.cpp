@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/kinematic_calibration.hpp>
+#include "inference/kinematic_calibration.hpp"
 
 #include <algorithm>
 #include <array>
@@ -13,12 +13,12 @@
 #include <ceres/solver.h>
 #include <Eigen/Core>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/moments.hpp>
-#include <wheelwright/identify/noise_level.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/statistics.hpp"
+#include "identify/moments.hpp"
+#include "identify/noise_level.hpp"
 
 namespace wheelwright::inference {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
+#include "core/log.hpp"
 
 namespace wheelwright::inference {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/robust.hpp>
+#include "inference/robust.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 
 #include <ceres/ceres.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/identify/least_squares.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "identify/least_squares.hpp"
 
 namespace wheelwright::inference {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/noise_levels.hpp>
+#include "inference/noise_levels.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/least_squares.hpp>
+#include "core/check.hpp"
+#include "core/log.hpp"
+#include "core/statistics.hpp"
+#include "identify/least_squares.hpp"
 
 namespace wheelwright::inference {
 namespace {

@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/identify/noise_level.hpp>
+#include "core/log.hpp"
+#include "filter/measurement.hpp"
+#include "identify/noise_level.hpp"
 
 namespace wheelwright::inference {
 

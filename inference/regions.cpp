@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/regions.hpp>
+#include "inference/regions.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/inference/block_bootstrap.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/statistics.hpp"
+#include "identify/noise_level.hpp"
+#include "inference/block_bootstrap.hpp"
 
 namespace wheelwright::inference {
 namespace {

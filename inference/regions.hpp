@@ -15,9 +15,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/identify/estimate.hpp>
-#include <wheelwright/identify/moments.hpp>
-#include <wheelwright/inference/block_bootstrap.hpp>
+#include "identify/estimate.hpp"
+#include "identify/moments.hpp"
+#include "inference/block_bootstrap.hpp"
 
 namespace wheelwright::inference {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/robust.hpp>
+#include "inference/robust.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/identify/moments.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "identify/moments.hpp"
 
 namespace wheelwright::inference {
 namespace {

@@ -10,8 +10,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/inference/constrained.hpp>
+#include "core/regression.hpp"
+#include "inference/constrained.hpp"
 
 namespace wheelwright::inference {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/bag.hpp>
+#include "logs/bag.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,13 +14,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/bag_files.hpp>
-#include <wheelwright/logs/mcap_format.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
+#include "logs/bag_files.hpp"
+#include "logs/mcap_format.hpp"
+#include "logs/ros_messages.hpp"
 
 namespace wheelwright::logs {
 namespace {

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/logs/ros_messages.hpp>
+#include "logs/ros_messages.hpp"
 
 namespace wheelwright::logs {
 

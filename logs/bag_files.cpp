@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/bag_files.hpp>
+#include "logs/bag_files.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -20,10 +20,10 @@
 #include <yaml-cpp/yaml.h>
 #include <zstd.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
+#include "core/error.hpp"
+#include "core/words.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::logs::bag {
 namespace {

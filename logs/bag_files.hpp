@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/files/temporary.hpp>
+#include "files/temporary.hpp"
 
 namespace wheelwright::logs::bag {
 

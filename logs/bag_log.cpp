@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/bag_log.hpp>
+#include "logs/bag_log.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,12 +12,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/bag.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
-#include <wheelwright/logs/row_log.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
+#include "logs/bag.hpp"
+#include "logs/recorded_log.hpp"
+#include "logs/ros_messages.hpp"
+#include "logs/row_log.hpp"
 
 namespace wheelwright::logs {
 namespace {

@@ -14,10 +14,10 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/logs/bag.hpp>
-#include <wheelwright/logs/csv_format.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/row_log.hpp>
+#include "logs/bag.hpp"
+#include "logs/csv_format.hpp"
+#include "logs/log_file.hpp"
+#include "logs/row_log.hpp"
 
 namespace wheelwright::logs {
 

@@ -11,13 +11,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/bag.hpp>
-#include <wheelwright/logs/database.hpp>
-#include <wheelwright/logs/mcap.hpp>
-#include <wheelwright/logs/mcap_format.hpp>
-#include <wheelwright/logs/row_log.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
+#include "logs/bag.hpp"
+#include "logs/database.hpp"
+#include "logs/mcap.hpp"
+#include "logs/mcap_format.hpp"
+#include "logs/row_log.hpp"
 
 namespace wheelwright::logs::bag {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/bag_write.hpp>
+#include "logs/bag_write.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,14 +15,14 @@
 #include <fastcdr/FastBuffer.h>
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/logs/bag_files.hpp>
-#include <wheelwright/logs/database.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/mcap.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "logs/bag_files.hpp"
+#include "logs/database.hpp"
+#include "logs/log_file.hpp"
+#include "logs/mcap.hpp"
+#include "logs/ros_messages.hpp"
 
 namespace wheelwright::logs {
 namespace {

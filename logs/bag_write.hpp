@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/logs/mcap_format.hpp>
+#include "logs/mcap_format.hpp"
 
 namespace wheelwright::logs {
 

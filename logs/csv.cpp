@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/csv.hpp>
+#include "logs/csv.hpp"
 
 #include <algorithm>
 #include <array>
@@ -13,13 +13,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/csv_format.hpp>
-#include <wheelwright/logs/known_logger.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-#include <wheelwright/logs/row_log.hpp>
+#include "core/check.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
+#include "logs/csv_format.hpp"
+#include "logs/known_logger.hpp"
+#include "logs/recorded_log.hpp"
+#include "logs/row_log.hpp"
 
 namespace wheelwright::logs {
 namespace {

@@ -15,10 +15,10 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/logs/csv_format.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-#include <wheelwright/logs/row_log.hpp>
+#include "core/log.hpp"
+#include "logs/csv_format.hpp"
+#include "logs/recorded_log.hpp"
+#include "logs/row_log.hpp"
 
 namespace wheelwright::logs {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/csv_format.hpp>
+#include "logs/csv_format.hpp"
 
 #include <algorithm>
 #include <array>
@@ -17,14 +17,14 @@
 #include <zlib.h>
 #include <zstd.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/known_logger.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
+#include "logs/csv.hpp"
+#include "logs/known_logger.hpp"
+#include "logs/log_file.hpp"
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::logs {
 

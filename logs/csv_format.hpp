@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/logs/row_log.hpp>
+#include "logs/row_log.hpp"
 
 namespace wheelwright::logs {
 

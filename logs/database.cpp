@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/database.hpp>
+#include "logs/database.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/mcap_format.hpp>
+#include "core/error.hpp"
+#include "logs/mcap_format.hpp"
 
 namespace wheelwright::logs::bag {
 namespace {

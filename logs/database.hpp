@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/logs/bag_files.hpp>
+#include "logs/bag_files.hpp"
 
 struct sqlite3;
 struct sqlite3_stmt;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/hdf5_attributes.hpp>
+#include "logs/hdf5_attributes.hpp"
 
 #include <array>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/hdf5_log.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
+#include "files/words.hpp"
+#include "logs/hdf5_log.hpp"
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::logs::hdf5 {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/hdf5_header.hpp>
+#include "logs/hdf5_header.hpp"
 
 #include <algorithm>
 #include <string_view>

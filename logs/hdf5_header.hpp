@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include <wheelwright/logs/mcap_format.hpp>
+#include "logs/mcap_format.hpp"
 
 namespace wheelwright::logs::hdf5 {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/hdf5_log.hpp>
+#include "logs/hdf5_log.hpp"
 
 #include <algorithm>
 #include <array>
@@ -15,15 +15,15 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/bag_files.hpp>
-#include <wheelwright/logs/hdf5_attributes.hpp>
-#include <wheelwright/logs/hdf5_header.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/mcap_format.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
+#include "logs/bag_files.hpp"
+#include "logs/hdf5_attributes.hpp"
+#include "logs/hdf5_header.hpp"
+#include "logs/log_file.hpp"
+#include "logs/mcap_format.hpp"
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::logs {
 namespace {

@@ -14,8 +14,8 @@
 
 #include <hdf5.h>
 
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/row_log.hpp>
+#include "logs/log_file.hpp"
+#include "logs/row_log.hpp"
 
 namespace wheelwright::logs::hdf5 {
 

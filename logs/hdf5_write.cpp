@@ -3,11 +3,11 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/logs/hdf5_log.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "logs/hdf5_log.hpp"
+#include "logs/log_file.hpp"
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::logs {
 namespace {

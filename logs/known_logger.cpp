@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/known_logger.hpp>
+#include "logs/known_logger.hpp"
 
 #include <algorithm>
 #include <string_view>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/log_file.hpp>
+#include "logs/log_file.hpp"
 
 #include <sys/stat.h>
 
@@ -11,12 +11,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/bag.hpp>
-#include <wheelwright/logs/bag_log.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/hdf5_log.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "logs/bag.hpp"
+#include "logs/bag_log.hpp"
+#include "logs/csv.hpp"
+#include "logs/hdf5_log.hpp"
 
 namespace wheelwright::logs {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/logs/csv_format.hpp>
-#include <wheelwright/logs/mcap_format.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
+#include "core/log.hpp"
+#include "logs/csv_format.hpp"
+#include "logs/mcap_format.hpp"
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::logs {
 

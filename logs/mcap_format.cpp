@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/mcap_format.hpp>
+#include "logs/mcap_format.hpp"
 
 #include <algorithm>
 #include <array>
@@ -15,8 +15,8 @@
 #include <zlib.h>
 #include <zstd.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
 
 namespace wheelwright::logs::mcap {
 

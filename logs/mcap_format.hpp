@@ -18,7 +18,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/files/bytes.hpp>
+#include "files/bytes.hpp"
 
 namespace wheelwright::logs {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/mcap.hpp>
+#include "logs/mcap.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -10,10 +10,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/mcap_format.hpp>
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
+#include "logs/mcap_format.hpp"
 
 namespace wheelwright::logs {
 namespace {

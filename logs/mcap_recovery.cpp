@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/mcap.hpp>
+#include "logs/mcap.hpp"
 
 #include <algorithm>
 #include <string_view>
 
-#include <wheelwright/logs/mcap_format.hpp>
+#include "logs/mcap_format.hpp"
 
 namespace wheelwright::logs::mcap {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/mcap.hpp>
+#include "logs/mcap.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/logs/mcap_format.hpp>
+#include "core/check.hpp"
+#include "files/bytes.hpp"
+#include "logs/mcap_format.hpp"
 
 namespace wheelwright::logs {
 

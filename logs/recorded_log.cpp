@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/recorded_log.hpp>
+#include "logs/recorded_log.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/known_logger.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
+#include "logs/known_logger.hpp"
 
 namespace wheelwright::logs {
 namespace {

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
+#include "core/log.hpp"
 
 namespace wheelwright::logs {
 

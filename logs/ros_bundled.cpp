@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include <wheelwright/logs/ros_messages.hpp>
+#include "logs/ros_messages.hpp"
 
 namespace wheelwright::logs {
 namespace {

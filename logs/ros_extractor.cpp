@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/ros_messages.hpp>
+#include "logs/ros_messages.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,8 +11,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
 
 namespace wheelwright::logs::ros {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/ros_messages.hpp>
+#include "logs/ros_messages.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::logs {
 namespace {

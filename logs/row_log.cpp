@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/row_log.hpp>
+#include "logs/row_log.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,11 +9,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "core/limits.hpp"
+#include "core/statistics.hpp"
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::logs {
 

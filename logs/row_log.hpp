@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/logs/recorded_log.hpp>
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::logs {
 

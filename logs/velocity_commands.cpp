@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/velocity_commands.hpp>
+#include "logs/velocity_commands.hpp"
 
 #include <cmath>
 #include <vector>
 
-#include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
+#include "logs/bag_write.hpp"
+#include "logs/ros_messages.hpp"
 
 namespace wheelwright::logs {
 

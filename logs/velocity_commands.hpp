@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include <wheelwright/core/log.hpp>
+#include "core/log.hpp"
 
 namespace wheelwright::logs {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/model/differential_drive.hpp>
+#include "model/differential_drive.hpp"
 
 #include <string>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::model {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/model/model.hpp>
+#include "model/model.hpp"
 
 namespace wheelwright::model {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/model/effect_law.hpp>
+#include "model/effect_law.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,9 +7,9 @@
 #include <numbers>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/words.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/words.hpp"
 
 namespace wheelwright::model {
 

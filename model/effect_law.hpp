@@ -12,9 +12,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/model/model.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/interval.hpp"
+#include "model/model.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::model {
 

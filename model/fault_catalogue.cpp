@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/model/fault_type.hpp>
+#include "core/linear_algebra.hpp"
+#include "model/fault_type.hpp"
 
 #include <algorithm>
 #include <array>
 #include <numbers>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::model {
 namespace {

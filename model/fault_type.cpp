@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/model/fault_type.hpp>
+#include "model/fault_type.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::model {
 namespace {

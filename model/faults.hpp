@@ -10,8 +10,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/fault_type.hpp>
+#include "model/differential_drive.hpp"
+#include "model/fault_type.hpp"
 
 namespace wheelwright::model {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/model/model.hpp>
+#include "model/model.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::model {
 namespace {

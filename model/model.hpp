@@ -18,7 +18,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/interval.hpp>
+#include "core/interval.hpp"
 
 namespace wheelwright::model {
 

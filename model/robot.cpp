@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/model/robot.hpp>
+#include "model/robot.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/effect_law.hpp>
-#include <wheelwright/model/single_axis.hpp>
+#include "core/check.hpp"
+#include "model/differential_drive.hpp"
+#include "model/effect_law.hpp"
+#include "model/single_axis.hpp"
 
 namespace wheelwright::model {
 namespace {

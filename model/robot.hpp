@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/model/model.hpp>
+#include "core/interval.hpp"
+#include "core/log.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::model {
 

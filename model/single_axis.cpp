@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/model/single_axis.hpp>
+#include "model/single_axis.hpp"
 
 namespace wheelwright::model {
 

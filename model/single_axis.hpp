@@ -3,7 +3,7 @@
 /// One driven axis, linear or rotary: effort = inertia·q̈ + viscous·q̇ [+ coulomb·sgn q̇] [+ offset].
 #pragma once
 
-#include <wheelwright/model/model.hpp>
+#include "model/model.hpp"
 
 namespace wheelwright::model {
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/model/model.hpp>
+#include "model/model.hpp"
 
 namespace wheelwright::model {
 namespace {

@@ -12,11 +12,11 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/logs/csv_format.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
+#include "core/check.hpp"
+#include "core/log.hpp"
+#include "core/regression.hpp"
+#include "logs/csv_format.hpp"
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::python {
 

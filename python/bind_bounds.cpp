@@ -3,12 +3,11 @@
 #include <mutex>
 #include <optional>
 
-#include <wheelwright/bounds/interval_hull.hpp>
-#include <wheelwright/bounds/minimax.hpp>
-#include <wheelwright/detector/threshold.hpp>
-
-#include "arrays.hpp"
-#include "module.hpp"
+#include "bounds/interval_hull.hpp"
+#include "bounds/minimax.hpp"
+#include "detector/threshold.hpp"
+#include "python/arrays.hpp"
+#include "python/module.hpp"
 
 namespace wheelwright::python {
 

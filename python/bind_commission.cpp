@@ -7,16 +7,15 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/results/model_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include <wheelwright/results/detection_json.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/words/summary.hpp>
-#include "arrays.hpp"
-#include "module.hpp"
+#include "logs/log_file.hpp"
+#include "python/arrays.hpp"
+#include "python/module.hpp"
+#include "results/detection_json.hpp"
+#include "results/model_file.hpp"
+#include "results/model_json.hpp"
+#include "results/software.hpp"
+#include "robots/robot_file.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::python {
 

@@ -8,17 +8,16 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/results/detection_json.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/words/detect_words.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "arrays.hpp"
-#include "module.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/margin_survey.hpp"
+#include "core/check.hpp"
+#include "python/arrays.hpp"
+#include "python/module.hpp"
+#include "results/detection_json.hpp"
+#include "results/software.hpp"
+#include "robots/robot_file.hpp"
+#include "words/detect_words.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

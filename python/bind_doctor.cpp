@@ -7,26 +7,25 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/detector_choice.hpp>
-#include <wheelwright/commission/model_comparison.hpp>
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/export/export_c.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/results/check_words.hpp>
-#include <wheelwright/results/comparison_json.hpp>
-#include <wheelwright/results/detection_json.hpp>
-#include <wheelwright/results/health_json.hpp>
-#include <wheelwright/results/model_check.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/controller_file.hpp>
-#include <wheelwright/robots/online_model_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/robot_origin.hpp>
-#include <wheelwright/words/comparison_words.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "module.hpp"
+#include "commission/detector_choice.hpp"
+#include "commission/model_comparison.hpp"
+#include "commission/risk_watch.hpp"
+#include "core/check.hpp"
+#include "export/export_c.hpp"
+#include "files/bytes.hpp"
+#include "python/module.hpp"
+#include "results/check_words.hpp"
+#include "results/comparison_json.hpp"
+#include "results/detection_json.hpp"
+#include "results/health_json.hpp"
+#include "results/model_check.hpp"
+#include "results/software.hpp"
+#include "robots/controller_file.hpp"
+#include "robots/online_model_file.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/robot_origin.hpp"
+#include "words/comparison_words.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

@@ -6,19 +6,18 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/further_drive.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/results/gap_json.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/words/gap_words.hpp>
-
-#include "arrays.hpp"
-#include "module.hpp"
+#include "core/check.hpp"
+#include "files/words.hpp"
+#include "gap/diagnose.hpp"
+#include "gap/effect.hpp"
+#include "gap/further_drive.hpp"
+#include "logs/log_file.hpp"
+#include "python/arrays.hpp"
+#include "python/module.hpp"
+#include "results/gap_json.hpp"
+#include "results/software.hpp"
+#include "robots/robot_file.hpp"
+#include "words/gap_words.hpp"
 
 namespace wheelwright::python {
 

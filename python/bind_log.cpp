@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "arrays.hpp"
+#include "python/arrays.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -13,22 +13,21 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/setting.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/inference/identification.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-#include <wheelwright/logs/row_log.hpp>
-#include <wheelwright/results/identification_json.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "module.hpp"
+#include "commission/setting.hpp"
+#include "core/check.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
+#include "identify/least_squares.hpp"
+#include "inference/identification.hpp"
+#include "logs/csv.hpp"
+#include "logs/log_file.hpp"
+#include "logs/recorded_log.hpp"
+#include "logs/row_log.hpp"
+#include "python/module.hpp"
+#include "results/identification_json.hpp"
+#include "results/software.hpp"
+#include "robots/robot_file.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

@@ -8,23 +8,22 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/design/detection.hpp>
-#include <wheelwright/design/manoeuvre.hpp>
-#include <wheelwright/design/stages.hpp>
-#include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/named_rivals.hpp>
-#include <wheelwright/results/design_json.hpp>
-#include <wheelwright/results/gap_json.hpp>
-#include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "arrays.hpp"
-#include "module.hpp"
+#include "core/check.hpp"
+#include "design/detection.hpp"
+#include "design/manoeuvre.hpp"
+#include "design/stages.hpp"
+#include "gap/discrimination_design.hpp"
+#include "gap/effect.hpp"
+#include "gap/named_rivals.hpp"
+#include "python/arrays.hpp"
+#include "python/module.hpp"
+#include "results/design_json.hpp"
+#include "results/gap_json.hpp"
+#include "results/scenario_file.hpp"
+#include "results/software.hpp"
+#include "robots/robot_file.hpp"
+#include "sim/simulation.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

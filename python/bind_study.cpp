@@ -9,18 +9,17 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/results/fleet_json.hpp>
-#include <wheelwright/results/fleet_logs.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/results/study_json.hpp>
-#include <wheelwright/robots/fleet_list.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/study/study_work.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "arrays.hpp"
-#include "module.hpp"
+#include "core/check.hpp"
+#include "python/arrays.hpp"
+#include "python/module.hpp"
+#include "results/fleet_json.hpp"
+#include "results/fleet_logs.hpp"
+#include "results/software.hpp"
+#include "results/study_json.hpp"
+#include "robots/fleet_list.hpp"
+#include "robots/robot_file.hpp"
+#include "study/study_work.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

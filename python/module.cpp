@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "module.hpp"
+#include "python/module.hpp"
 
 #include <cmath>
 #include <exception>
@@ -7,9 +7,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/results/software.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "core/check.hpp"
+#include "results/software.hpp"
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::python {
 

@@ -23,15 +23,15 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/detector.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "bounds/feasible_set.hpp"
+#include "commission/commission.hpp"
+#include "core/log.hpp"
+#include "detector/detector.hpp"
+#include "files/json.hpp"
+#include "logs/log_file.hpp"
+#include "logs/recorded_log.hpp"
+#include "model/robot.hpp"
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::python {
 

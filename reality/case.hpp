@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/reality/effect.hpp>
-#include <wheelwright/reality/law.hpp>
-#include <wheelwright/reality/oracle.hpp>
+#include "reality/effect.hpp"
+#include "reality/law.hpp"
+#include "reality/oracle.hpp"
 
 namespace wheelwright::reality {
 

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/reality/effect.hpp>
+#include "core/error.hpp"
+#include "reality/effect.hpp"
 
 namespace wheelwright::reality {
 

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/reality/law.hpp>
+#include "reality/law.hpp"
 
 namespace wheelwright::reality {
 namespace {

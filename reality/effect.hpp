@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/reality/robot.hpp>
+#include "reality/robot.hpp"
 
 namespace wheelwright::reality {
 

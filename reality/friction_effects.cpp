@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include <wheelwright/reality/effect.hpp>
+#include "reality/effect.hpp"
 
 namespace wheelwright::reality {
 

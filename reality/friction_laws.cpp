@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <wheelwright/reality/law.hpp>
+#include "reality/law.hpp"
 
 namespace wheelwright::reality {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/reality/effect.hpp>
+#include "reality/effect.hpp"
 
 namespace wheelwright::reality {
 namespace {

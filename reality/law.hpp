@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/reality/effect.hpp>
+#include "reality/effect.hpp"
 
 namespace wheelwright::reality {
 

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/reality/law.hpp>
+#include "core/error.hpp"
+#include "reality/law.hpp"
 
 namespace wheelwright::reality {
 

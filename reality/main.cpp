@@ -15,13 +15,13 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/reality/case.hpp>
-#include <wheelwright/reality/replay.hpp>
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "files/json.hpp"
+#include "logs/csv.hpp"
+#include "logs/log_file.hpp"
+#include "reality/case.hpp"
+#include "reality/replay.hpp"
 
 namespace {
 

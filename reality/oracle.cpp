@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include <wheelwright/reality/oracle.hpp>
-#include <wheelwright/reality/rivals.hpp>
+#include "reality/oracle.hpp"
+#include "reality/rivals.hpp"
 
 namespace wheelwright::reality {
 namespace {

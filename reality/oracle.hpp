@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/reality/signals.hpp>
+#include "reality/signals.hpp"
 
 namespace wheelwright::reality {
 

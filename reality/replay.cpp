@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 #include <Eigen/Core>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/reality/engine.hpp>
-#include <wheelwright/reality/replay.hpp>
-#include <wheelwright/reality/robot.hpp>
-#include <wheelwright/reality/signals.hpp>
+#include "core/error.hpp"
+#include "reality/engine.hpp"
+#include "reality/replay.hpp"
+#include "reality/robot.hpp"
+#include "reality/signals.hpp"
 
 namespace wheelwright::reality {
 namespace {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include <wheelwright/core/log.hpp>
+#include "core/log.hpp"
 
 namespace wheelwright::reality {
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/reality/rivals.hpp>
+#include "reality/rivals.hpp"
 
 namespace wheelwright::reality {
 namespace {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/reality/signals.hpp>
+#include "reality/signals.hpp"
 
 namespace wheelwright::reality {
 

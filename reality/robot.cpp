@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/reality/robot.hpp>
+#include "reality/robot.hpp"
 
 namespace wheelwright::reality {
 namespace {

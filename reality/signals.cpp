@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <wheelwright/reality/signals.hpp>
+#include "reality/signals.hpp"
 
 namespace wheelwright::reality {
 namespace {

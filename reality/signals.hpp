@@ -5,8 +5,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/reality/world.hpp>
+#include "core/log.hpp"
+#include "reality/world.hpp"
 
 namespace wheelwright::reality {
 

@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/reality/engine.hpp>
-#include <wheelwright/reality/world.hpp>
+#include "core/error.hpp"
+#include "reality/engine.hpp"
+#include "reality/world.hpp"
 
 namespace wheelwright::reality {
 namespace {

@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <vector>
 
-#include <wheelwright/reality/effect.hpp>
-#include <wheelwright/reality/robot.hpp>
+#include "reality/effect.hpp"
+#include "reality/robot.hpp"
 
 namespace wheelwright::reality {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/choice_report.hpp>
+#include "report/choice_report.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,12 +8,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/words/detect_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "core/limits.hpp"
+#include "core/words.hpp"
+#include "report/commission_report.hpp"
+#include "report/drawing.hpp"
+#include "words/detect_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 using namespace words;

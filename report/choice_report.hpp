@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include <wheelwright/commission/detector_choice.hpp>
-#include <wheelwright/report/page.hpp>
+#include "commission/detector_choice.hpp"
+#include "report/page.hpp"
 
 namespace wheelwright::report {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/commission_report.hpp>
+#include "report/commission_report.hpp"
 
 #include <optional>
 #include <utility>
@@ -7,13 +7,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/outlook.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/report/sections.hpp>
-#include <wheelwright/report/signals.hpp>
-#include <wheelwright/words/commission_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "report/drawing.hpp"
+#include "report/outlook.hpp"
+#include "report/page.hpp"
+#include "report/sections.hpp"
+#include "report/signals.hpp"
+#include "words/commission_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 using namespace words;

@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/report/page.hpp>
+#include "commission/commission.hpp"
+#include "report/page.hpp"
 
 namespace wheelwright::report {
 

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/comparison_report.hpp>
+#include "report/comparison_report.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/words/comparison_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "core/words.hpp"
+#include "report/drawing.hpp"
+#include "report/page.hpp"
+#include "words/comparison_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 using namespace words;

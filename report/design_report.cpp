@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/design_report.hpp>
+#include "report/design_report.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,12 +8,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/words/detect_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "commission/physical.hpp"
+#include "commission/risk_watch.hpp"
+#include "report/drawing.hpp"
+#include "report/page.hpp"
+#include "words/detect_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

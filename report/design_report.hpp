@@ -5,10 +5,10 @@
 
 #include <string>
 
-#include <wheelwright/design/detection.hpp>
-#include <wheelwright/design/manoeuvre.hpp>
-#include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/report/page.hpp>
+#include "design/detection.hpp"
+#include "design/manoeuvre.hpp"
+#include "gap/discrimination_design.hpp"
+#include "report/page.hpp"
 
 namespace wheelwright::report {
 

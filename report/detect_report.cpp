@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/detect_report.hpp>
+#include "report/detect_report.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,14 +10,14 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/outlook.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/report/sections.hpp>
-#include <wheelwright/report/signals.hpp>
-#include <wheelwright/words/detect_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "core/limits.hpp"
+#include "report/drawing.hpp"
+#include "report/outlook.hpp"
+#include "report/page.hpp"
+#include "report/sections.hpp"
+#include "report/signals.hpp"
+#include "words/detect_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

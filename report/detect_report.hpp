@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/incident_watch.hpp>
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/report/page.hpp>
+#include "commission/commission.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/incident_watch.hpp"
+#include "commission/margin_survey.hpp"
+#include "commission/risk_watch.hpp"
+#include "report/page.hpp"
 
 namespace wheelwright::report {
 

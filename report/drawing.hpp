@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/filter_choice.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/report/sections.hpp>
+#include "commission/commission.hpp"
+#include "commission/filter_choice.hpp"
+#include "core/limits.hpp"
+#include "core/log.hpp"
+#include "report/sections.hpp"
 
 namespace wheelwright::report {
 

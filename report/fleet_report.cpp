@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/fleet_report.hpp>
+#include "report/fleet_report.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/report/sections.hpp>
-#include <wheelwright/words/text.hpp>
+#include "report/drawing.hpp"
+#include "report/page.hpp"
+#include "report/sections.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <string>
 
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/study/fleet_result.hpp>
+#include "report/page.hpp"
+#include "study/fleet_result.hpp"
 
 namespace wheelwright::report {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/gap_report.hpp>
+#include "report/gap_report.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,9 +10,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/gap/where.hpp>
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/words/text.hpp>
+#include "gap/where.hpp"
+#include "report/drawing.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 using namespace words;

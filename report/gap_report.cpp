@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/gap_report.hpp>
+#include "report/gap_report.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/gap/where.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/report/signals.hpp>
-#include <wheelwright/words/gap_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "core/statistics.hpp"
+#include "gap/where.hpp"
+#include "report/page.hpp"
+#include "report/signals.hpp"
+#include "words/gap_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 using namespace words;

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/report/page.hpp>
+#include "core/log.hpp"
+#include "gap/diagnosis.hpp"
+#include "report/page.hpp"
 
 namespace wheelwright::report {
 

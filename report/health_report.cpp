@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/health_report.hpp>
+#include "report/health_report.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/report/signals.hpp>
-#include <wheelwright/words/text.hpp>
+#include "report/page.hpp"
+#include "report/signals.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

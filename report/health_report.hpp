@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/report/page.hpp>
+#include "doctor/log_health.hpp"
+#include "report/page.hpp"
 
 namespace wheelwright::report {
 

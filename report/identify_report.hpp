@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/inference/identification.hpp>
-#include <wheelwright/report/page.hpp>
+#include "inference/identification.hpp"
+#include "report/page.hpp"
 
 namespace wheelwright::report {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/outlook.hpp>
+#include "report/outlook.hpp"
 
 #include <array>
 #include <cmath>
@@ -8,11 +8,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/words/detect_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "core/words.hpp"
+#include "report/drawing.hpp"
+#include "report/page.hpp"
+#include "words/detect_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/detector/online_model.hpp>
+#include "commission/margin_survey.hpp"
+#include "detector/online_model.hpp"
 
 namespace wheelwright::report {
 

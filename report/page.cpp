@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/page.hpp>
+#include "report/page.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,12 +12,11 @@
 #include <zlib.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/report/sections.hpp>
-#include <wheelwright/words/text.hpp>
-
+#include "core/error.hpp"
+#include "core/statistics.hpp"
+#include "report/sections.hpp"
 #include "report_assets.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

@@ -14,11 +14,11 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/words/text.hpp>
+#include "commission/detector_walk.hpp"
+#include "commission/margin_survey.hpp"
+#include "core/log.hpp"
+#include "core/warrant.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

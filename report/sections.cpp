@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/sections.hpp>
+#include "report/sections.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,14 +10,14 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/assumptions.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/words/commission_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "commission/assumptions.hpp"
+#include "commission/physical.hpp"
+#include "core/statistics.hpp"
+#include "identify/noise_level.hpp"
+#include "report/drawing.hpp"
+#include "report/page.hpp"
+#include "words/commission_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

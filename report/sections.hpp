@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/assumptions.hpp>
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/words/commission_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "commission/assumptions.hpp"
+#include "commission/commission.hpp"
+#include "report/page.hpp"
+#include "words/commission_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

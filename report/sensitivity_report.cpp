@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/report/sensitivity_report.hpp>
+#include "report/sensitivity_report.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,11 +8,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/report/drawing.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/report/sections.hpp>
-#include <wheelwright/words/text.hpp>
+#include "core/check.hpp"
+#include "report/drawing.hpp"
+#include "report/page.hpp"
+#include "report/sections.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report {
 

@@ -11,10 +11,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/study/bound_derivatives.hpp>
-#include <wheelwright/study/global_sensitivity.hpp>
-#include <wheelwright/study/study.hpp>
+#include "report/page.hpp"
+#include "study/bound_derivatives.hpp"
+#include "study/global_sensitivity.hpp"
+#include "study/study.hpp"
 
 namespace wheelwright::report {
 

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/report/page.hpp>
+#include "commission/detector_walk.hpp"
+#include "core/log.hpp"
+#include "model/robot.hpp"
+#include "report/page.hpp"
 
 namespace wheelwright::report {
 

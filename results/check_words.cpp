@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/check_words.hpp>
+#include "results/check_words.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/words/text.hpp>
+#include "commission/physical.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::results {
 namespace {

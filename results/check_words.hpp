@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/results/model_check.hpp>
+#include "results/model_check.hpp"
 
 namespace wheelwright::results {
 

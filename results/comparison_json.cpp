@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/comparison_json.hpp>
+#include "results/comparison_json.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/robots/online_model_file.hpp>
-#include <wheelwright/words/comparison_words.hpp>
+#include "robots/online_model_file.hpp"
+#include "words/comparison_words.hpp"
 
 namespace wheelwright::results {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include <wheelwright/commission/model_comparison.hpp>
-#include <wheelwright/files/json.hpp>
+#include "commission/model_comparison.hpp"
+#include "files/json.hpp"
 
 namespace wheelwright::results {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/design_json.hpp>
+#include "results/design_json.hpp"
 
 #include <cmath>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/physical.hpp>
+#include "commission/physical.hpp"
 
 namespace wheelwright::results {
 namespace {

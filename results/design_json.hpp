@@ -5,10 +5,10 @@
 
 #include <string>
 
-#include <wheelwright/design/detection.hpp>
-#include <wheelwright/design/manoeuvre.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/gap/discrimination_design.hpp>
+#include "design/detection.hpp"
+#include "design/manoeuvre.hpp"
+#include "files/json.hpp"
+#include "gap/discrimination_design.hpp"
 
 namespace wheelwright::results {
 

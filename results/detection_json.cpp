@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/detection_json.hpp>
+#include "results/detection_json.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/results/model_json.hpp>
-#include <wheelwright/words/detect_words.hpp>
+#include "files/json.hpp"
+#include "results/model_json.hpp"
+#include "words/detect_words.hpp"
 
 namespace wheelwright::results {
 

@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/blind_watch.hpp>
-#include <wheelwright/commission/detector_choice.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/incident_watch.hpp>
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/files/json.hpp>
+#include "commission/blind_watch.hpp"
+#include "commission/detector_choice.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/incident_watch.hpp"
+#include "commission/margin_survey.hpp"
+#include "commission/risk_watch.hpp"
+#include "files/json.hpp"
 
 namespace wheelwright::results {
 

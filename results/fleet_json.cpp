@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/fleet_json.hpp>
+#include "results/fleet_json.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/results/model_json.hpp>
-#include <wheelwright/robots/online_model_file.hpp>
+#include "files/words.hpp"
+#include "results/model_json.hpp"
+#include "robots/online_model_file.hpp"
 
 namespace wheelwright::results {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/study/fleet_result.hpp>
-#include <wheelwright/study/population.hpp>
+#include "files/json.hpp"
+#include "study/fleet_result.hpp"
+#include "study/population.hpp"
 
 namespace wheelwright::results {
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/fleet_logs.hpp>
+#include "results/fleet_logs.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/results/health_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "core/error.hpp"
+#include "results/health_json.hpp"
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 

@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/robots/fleet_list.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/study/examine_robot.hpp>
+#include "doctor/log_health.hpp"
+#include "logs/log_file.hpp"
+#include "model/robot.hpp"
+#include "robots/fleet_list.hpp"
+#include "robots/robot_file.hpp"
+#include "study/examine_robot.hpp"
 
 namespace wheelwright::results {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/gap_json.hpp>
+#include "results/gap_json.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +11,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/gap/where.hpp>
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "files/json.hpp"
+#include "gap/where.hpp"
 
 namespace wheelwright::results {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/discrimination.hpp>
-#include <wheelwright/gap/further_drive.hpp>
+#include "files/json.hpp"
+#include "gap/diagnosis.hpp"
+#include "gap/discrimination.hpp"
+#include "gap/further_drive.hpp"
 
 namespace wheelwright::results {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/health_json.hpp>
+#include "results/health_json.hpp"
 
 #include <cmath>
 #include <utility>

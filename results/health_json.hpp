@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
+#include "doctor/log_health.hpp"
+#include "files/json.hpp"
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::results {
 

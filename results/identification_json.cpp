@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/identification_json.hpp>
+#include "results/identification_json.hpp"
 
 #include <cmath>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/results/model_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/words/identification_words.hpp>
+#include "commission/physical.hpp"
+#include "files/words.hpp"
+#include "results/model_json.hpp"
+#include "robots/robot_file.hpp"
+#include "words/identification_words.hpp"
 
 namespace wheelwright::results {
 

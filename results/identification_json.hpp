@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <string>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/identify/estimate.hpp>
-#include <wheelwright/inference/identification.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
+#include "files/json.hpp"
+#include "identify/estimate.hpp"
+#include "inference/identification.hpp"
+#include "logs/recorded_log.hpp"
 
 namespace wheelwright::results {
 

@@ -5,12 +5,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/results/identification_json.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/results/model_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "files/json.hpp"
+#include "files/words.hpp"
+#include "results/identification_json.hpp"
+#include "results/model_file.hpp"
+#include "results/model_json.hpp"
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/model_check.hpp>
+#include "results/model_check.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -7,12 +7,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/fit.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/commission/pose_at_risk.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/results/model_json.hpp>
-#include <wheelwright/results/risk_check.hpp>
+#include "commission/fit.hpp"
+#include "commission/physical.hpp"
+#include "commission/pose_at_risk.hpp"
+#include "filter/row_stream.hpp"
+#include "results/model_json.hpp"
+#include "results/risk_check.hpp"
 
 namespace wheelwright::results {
 namespace {

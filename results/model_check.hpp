@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/results/set_check.hpp>
+#include "core/log.hpp"
+#include "files/json.hpp"
+#include "results/model_file.hpp"
+#include "results/set_check.hpp"
 
 namespace wheelwright::results {
 

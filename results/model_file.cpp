@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/model_file.hpp>
+#include "results/model_file.hpp"
 
 #include <algorithm>
 #include <limits>
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/results/model_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "core/limits.hpp"
+#include "files/json.hpp"
+#include "results/model_json.hpp"
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 

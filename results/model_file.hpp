@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-#include <wheelwright/robots/online_model_file.hpp>
+#include "commission/commission.hpp"
+#include "files/json.hpp"
+#include "logs/recorded_log.hpp"
+#include "robots/online_model_file.hpp"
 
 namespace wheelwright::results {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/model_json.hpp>
+#include "results/model_json.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,12 +10,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/results/identification_json.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "commission/physical.hpp"
+#include "files/json.hpp"
+#include "files/words.hpp"
+#include "results/identification_json.hpp"
+#include "results/model_file.hpp"
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 

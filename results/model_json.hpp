@@ -7,13 +7,13 @@
 #include <optional>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/kinematic.hpp>
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/filter/error_class.hpp>
-#include <wheelwright/robots/robot_keys.hpp>
+#include "commission/commission.hpp"
+#include "commission/kinematic.hpp"
+#include "core/warrant.hpp"
+#include "files/json.hpp"
+#include "files/words.hpp"
+#include "filter/error_class.hpp"
+#include "robots/robot_keys.hpp"
 
 namespace wheelwright::results {
 

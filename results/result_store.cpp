@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/result_store.hpp>
+#include "results/result_store.hpp"
 
 #include <cstdint>
 #include <system_error>
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/logs/database.hpp>
+#include "core/check.hpp"
+#include "files/words.hpp"
+#include "logs/database.hpp"
 
 namespace wheelwright::results {
 namespace {

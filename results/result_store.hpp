@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/study/work.hpp>
+#include "study/work.hpp"
 
 namespace wheelwright::results {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/risk_check.hpp>
+#include "results/risk_check.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,10 +11,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/results/model_json.hpp>
+#include "commission/noise_budget.hpp"
+#include "commission/physical.hpp"
+#include "core/limits.hpp"
+#include "results/model_json.hpp"
 
 namespace wheelwright::results {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/results/model_check.hpp>
+#include "core/log.hpp"
+#include "results/model_check.hpp"
 
 namespace wheelwright::results {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/scenario_file.hpp>
+#include "results/scenario_file.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,12 +12,12 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/place.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/robot_keys.hpp>
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "files/place.hpp"
+#include "logs/csv.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/robot_keys.hpp"
 
 namespace wheelwright::results {
 

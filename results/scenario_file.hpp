@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/sim/simulation.hpp>
+#include "sim/simulation.hpp"
 
 namespace wheelwright::results {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/set_check.hpp>
+#include "results/set_check.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/slab_rows.hpp>
+#include "bounds/slab_rows.hpp"
 
 namespace wheelwright::results {
 namespace {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/bounds/check_certificate.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/results/model_file.hpp>
+#include "bounds/check_certificate.hpp"
+#include "core/regression.hpp"
+#include "results/model_file.hpp"
 
 namespace wheelwright::results {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/software.hpp>
+#include "results/software.hpp"
 
 namespace wheelwright::results {
 

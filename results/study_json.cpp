@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/study_json.hpp>
+#include "results/study_json.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,14 +9,14 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/files/place.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/results/model_json.hpp>
-#include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "files/json.hpp"
+#include "files/place.hpp"
+#include "logs/log_file.hpp"
+#include "results/model_json.hpp"
+#include "results/scenario_file.hpp"
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 

@@ -11,11 +11,11 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/study/bound_derivatives.hpp>
-#include <wheelwright/study/study.hpp>
+#include "core/log.hpp"
+#include "files/json.hpp"
+#include "model/robot.hpp"
+#include "study/bound_derivatives.hpp"
+#include "study/study.hpp"
 
 namespace wheelwright::results {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/controller_file.hpp>
+#include "robots/controller_file.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/place.hpp>
-#include <wheelwright/files/words.hpp>
+#include "files/bytes.hpp"
+#include "files/place.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::robots {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <string_view>
 
-#include <wheelwright/files/place.hpp>
-#include <wheelwright/robots/robot_description.hpp>
+#include "files/place.hpp"
+#include "robots/robot_description.hpp"
 
 namespace wheelwright::robots {
 

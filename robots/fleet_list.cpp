@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/fleet_list.hpp>
+#include "robots/fleet_list.hpp"
 
 #include <sys/stat.h>
 
@@ -14,10 +14,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/words.hpp>
+#include "core/error.hpp"
+#include "core/words.hpp"
+#include "files/bytes.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::robots {
 namespace {

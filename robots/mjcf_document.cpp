@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/robots/simulator_document.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
+#include "robots/simulator_document.hpp"
 
 namespace wheelwright::robots {
 namespace {

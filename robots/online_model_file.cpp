@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/online_model_file.hpp>
+#include "robots/online_model_file.hpp"
 
 #include <algorithm>
 #include <string_view>
@@ -8,14 +8,14 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/pose_sums.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/robot_keys.hpp>
+#include "bounds/polytope.hpp"
+#include "core/error.hpp"
+#include "detector/pose_sums.hpp"
+#include "detector/scale_detector.hpp"
+#include "files/bytes.hpp"
+#include "model/robot.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/robot_keys.hpp"
 
 namespace wheelwright::robots {
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/files/json.hpp>
+#include "detector/online_model.hpp"
+#include "files/json.hpp"
 
 namespace wheelwright::robots {
 

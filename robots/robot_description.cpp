@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/robot_description.hpp>
+#include "robots/robot_description.hpp"
 
 #include <algorithm>
 #include <map>
@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/place.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/robots/controller_file.hpp>
+#include "files/bytes.hpp"
+#include "files/place.hpp"
+#include "files/words.hpp"
+#include "robots/controller_file.hpp"
 
 namespace wheelwright::robots {
 

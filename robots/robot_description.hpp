@@ -12,7 +12,7 @@
 
 #include <Eigen/Geometry>
 
-#include <wheelwright/files/place.hpp>
+#include "files/place.hpp"
 
 namespace wheelwright::robots {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/robot_file.hpp>
+#include "robots/robot_file.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,10 +8,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/place.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/robots/robot_keys.hpp>
+#include "files/bytes.hpp"
+#include "files/place.hpp"
+#include "files/words.hpp"
+#include "robots/robot_keys.hpp"
 
 namespace wheelwright::robots {
 

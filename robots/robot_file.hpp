@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "files/json.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::robots {
 

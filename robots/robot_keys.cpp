@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/robot_keys.hpp>
+#include "robots/robot_keys.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/model/effect_law.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
+#include "model/effect_law.hpp"
 
 namespace wheelwright::robots {
 

@@ -6,14 +6,14 @@
 #include <cstddef>
 #include <vector>
 
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/files/place.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/robots/robot_origin.hpp>
-#include <wheelwright/robots/wheel_geometry.hpp>
+#include "core/warrant.hpp"
+#include "files/place.hpp"
+#include "files/words.hpp"
+#include "filter/measurement.hpp"
+#include "filter/noise.hpp"
+#include "model/robot.hpp"
+#include "robots/robot_origin.hpp"
+#include "robots/wheel_geometry.hpp"
 
 namespace wheelwright::robots {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/robot_origin.hpp>
+#include "robots/robot_origin.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/robot_keys.hpp>
-#include <wheelwright/robots/wheel_geometry.hpp>
+#include "files/words.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/robot_keys.hpp"
+#include "robots/wheel_geometry.hpp"
 
 namespace wheelwright::robots {
 

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/robots/robot_description.hpp>
+#include "files/json.hpp"
+#include "model/robot.hpp"
+#include "robots/robot_description.hpp"
 
 namespace wheelwright::robots {
 

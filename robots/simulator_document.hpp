@@ -11,9 +11,9 @@
 
 #include <Eigen/Geometry>
 
-#include <wheelwright/files/xml_text.hpp>
-#include <wheelwright/robots/robot_description.hpp>
-#include <wheelwright/robots/simulator_file.hpp>
+#include "files/xml_text.hpp"
+#include "robots/robot_description.hpp"
+#include "robots/simulator_file.hpp"
 
 namespace wheelwright::robots {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/simulator_file.hpp>
+#include "robots/simulator_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/words.hpp>
-#include <wheelwright/robots/simulator_document.hpp>
-#include <wheelwright/robots/wheel_geometry.hpp>
+#include "core/error.hpp"
+#include "files/words.hpp"
+#include "robots/simulator_document.hpp"
+#include "robots/wheel_geometry.hpp"
 
 namespace wheelwright::robots {
 

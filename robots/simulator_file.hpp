@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/model/simulator_change.hpp>
+#include "files/json.hpp"
+#include "model/robot.hpp"
+#include "model/simulator_change.hpp"
 
 namespace wheelwright::robots {
 

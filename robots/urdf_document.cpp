@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <wheelwright/robots/simulator_document.hpp>
+#include "robots/simulator_document.hpp"
 
 namespace wheelwright::robots {
 namespace {

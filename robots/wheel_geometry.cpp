@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/wheel_geometry.hpp>
+#include "robots/wheel_geometry.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/files/words.hpp>
+#include "files/words.hpp"
 
 namespace wheelwright::robots {
 namespace {

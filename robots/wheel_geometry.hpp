@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/robots/robot_description.hpp>
+#include "robots/robot_description.hpp"
 
 namespace wheelwright::robots {
 

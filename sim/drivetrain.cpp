@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/sim/drivetrain.hpp>
+#include "sim/drivetrain.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include <wheelwright/model/effect_law.hpp>
+#include "model/effect_law.hpp"
 
 namespace wheelwright::sim {
 namespace {

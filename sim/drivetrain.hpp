@@ -9,8 +9,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/sim/plant.hpp>
+#include "model/robot.hpp"
+#include "sim/plant.hpp"
 
 namespace wheelwright::sim {
 

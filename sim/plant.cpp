@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/sim/plant.hpp>
+#include "sim/plant.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 #include <string_view>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/core/random.hpp>
-#include <wheelwright/model/effect_law.hpp>
+#include "core/check.hpp"
+#include "core/linear_algebra.hpp"
+#include "core/random.hpp"
+#include "model/effect_law.hpp"
 
 namespace wheelwright::sim {
 namespace {

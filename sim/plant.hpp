@@ -11,10 +11,10 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/effect_law.hpp>
-#include <wheelwright/model/faults.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "model/differential_drive.hpp"
+#include "model/effect_law.hpp"
+#include "model/faults.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::sim {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/sim/simulation.hpp>
+#include "sim/simulation.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/model/effect_law.hpp>
+#include "core/check.hpp"
+#include "model/effect_law.hpp"
 
 namespace wheelwright::sim {
 namespace {

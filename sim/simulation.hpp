@@ -13,13 +13,13 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/faults.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/sim/drivetrain.hpp>
-#include <wheelwright/sim/plant.hpp>
+#include "core/interval.hpp"
+#include "core/log.hpp"
+#include "model/differential_drive.hpp"
+#include "model/faults.hpp"
+#include "model/robot.hpp"
+#include "sim/drivetrain.hpp"
+#include "sim/plant.hpp"
 
 namespace wheelwright::sim {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/bound_derivatives.hpp>
+#include "study/bound_derivatives.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +9,13 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/linear_program.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/linear_algebra.hpp>
-#include <wheelwright/study/bound_rates.hpp>
-#include <wheelwright/study/study_case.hpp>
+#include "bounds/linear_program.hpp"
+#include "bounds/slab_rows.hpp"
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/linear_algebra.hpp"
+#include "study/bound_rates.hpp"
+#include "study/study_case.hpp"
 
 namespace wheelwright::study {
 

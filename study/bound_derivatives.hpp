@@ -25,13 +25,13 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/core/warrant.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "bounds/polytope.hpp"
+#include "commission/commission.hpp"
+#include "core/log.hpp"
+#include "core/regression.hpp"
+#include "core/warrant.hpp"
+#include "filter/measurement.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::study {
 

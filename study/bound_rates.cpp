@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/bound_rates.hpp>
+#include "study/bound_rates.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,11 +9,11 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/commission/noise_budget.hpp>
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/filter/motion_bound.hpp>
+#include "bounds/slab_rows.hpp"
+#include "commission/noise_budget.hpp"
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "filter/motion_bound.hpp"
 
 namespace wheelwright::study {
 namespace {

@@ -20,10 +20,10 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/study/bound_derivatives.hpp>
+#include "commission/commission.hpp"
+#include "core/log.hpp"
+#include "filter/row_stream.hpp"
+#include "study/bound_derivatives.hpp"
 
 namespace wheelwright::study {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/examine_robot.hpp>
+#include "study/examine_robot.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/physical.hpp>
+#include "commission/detector_walk.hpp"
+#include "commission/physical.hpp"
 
 namespace wheelwright::study {
 namespace {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/study/population.hpp>
+#include "commission/commission.hpp"
+#include "core/log.hpp"
+#include "study/population.hpp"
 
 namespace wheelwright::study {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/fleet_result.hpp>
+#include "study/fleet_result.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/study/population.hpp>
+#include "core/statistics.hpp"
+#include "study/population.hpp"
 
 namespace wheelwright::study {
 namespace {

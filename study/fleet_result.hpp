@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/study/population.hpp>
+#include "study/population.hpp"
 
 namespace wheelwright::study {
 

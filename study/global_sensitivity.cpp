@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/global_sensitivity.hpp>
+#include "study/global_sensitivity.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,10 +14,10 @@
 #include <fmt/ranges.h>
 #include <boost/random/sobol.hpp>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/random.hpp>
-#include <wheelwright/core/statistics.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/random.hpp"
+#include "core/statistics.hpp"
 
 namespace wheelwright::study {
 namespace {

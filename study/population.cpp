@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/population.hpp>
+#include "study/population.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,9 +13,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/statistics.hpp>
+#include "core/check.hpp"
+#include "core/limits.hpp"
+#include "core/statistics.hpp"
 
 namespace wheelwright::study {
 

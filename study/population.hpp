@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/warrant.hpp>
+#include "core/interval.hpp"
+#include "core/warrant.hpp"
 
 namespace wheelwright::study {
 

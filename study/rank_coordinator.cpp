@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/rank_coordinator.hpp>
+#include "study/rank_coordinator.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -10,9 +10,9 @@
 
 #include <mpi.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/study/work_on_ranks.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "study/work_on_ranks.hpp"
 
 namespace wheelwright::study {
 

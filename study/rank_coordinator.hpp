@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/study/work.hpp>
-#include <wheelwright/study/work_on_ranks.hpp>
+#include "study/work.hpp"
+#include "study/work_on_ranks.hpp"
 
 namespace wheelwright::study {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/study.hpp>
+#include "study/study.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/setting.hpp>
-#include <wheelwright/core/check.hpp>
+#include "commission/setting.hpp"
+#include "core/check.hpp"
 
 namespace wheelwright::study {
 namespace {

@@ -11,9 +11,9 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/study/global_sensitivity.hpp>
-#include <wheelwright/study/study_case.hpp>
-#include <wheelwright/study/study_quantity.hpp>
+#include "study/global_sensitivity.hpp"
+#include "study/study_case.hpp"
+#include "study/study_quantity.hpp"
 
 namespace wheelwright::study {
 

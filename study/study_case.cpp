@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/study_case.hpp>
+#include "study/study_case.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,9 +8,9 @@
 #include <random>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/random.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "core/check.hpp"
+#include "core/random.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::study {
 

@@ -11,9 +11,9 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "core/log.hpp"
+#include "model/robot.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::study {
 

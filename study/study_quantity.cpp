@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/study_quantity.hpp>
+#include "study/study_quantity.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,15 +8,15 @@
 #include <optional>
 #include <utility>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/model/fault_type.hpp>
+#include "commission/commission.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/margin_survey.hpp"
+#include "commission/physical.hpp"
+#include "core/error.hpp"
+#include "core/limits.hpp"
+#include "core/words.hpp"
+#include "gap/diagnose.hpp"
+#include "model/fault_type.hpp"
 
 namespace wheelwright::study {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/study/study_case.hpp>
+#include "model/robot.hpp"
+#include "study/study_case.hpp"
 
 namespace wheelwright::study {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/study_work.hpp>
+#include "study/study_work.hpp"
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/error.hpp>
+#include "commission/commission.hpp"
+#include "core/error.hpp"
 
 namespace wheelwright::study {
 namespace {

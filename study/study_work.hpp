@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/study/bound_derivatives.hpp>
-#include <wheelwright/study/study.hpp>
-#include <wheelwright/study/work.hpp>
+#include "study/bound_derivatives.hpp"
+#include "study/study.hpp"
+#include "study/work.hpp"
 
 namespace wheelwright::study {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/work_on_ranks.hpp>
+#include "study/work_on_ranks.hpp"
 
 #include <chrono>
 #include <exception>
@@ -11,9 +11,9 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/study/rank_coordinator.hpp>
+#include "core/check.hpp"
+#include "core/error.hpp"
+#include "study/rank_coordinator.hpp"
 
 namespace wheelwright::study {
 

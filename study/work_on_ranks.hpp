@@ -15,7 +15,7 @@
 #include <optional>
 #include <string>
 
-#include <wheelwright/study/work.hpp>
+#include "study/work.hpp"
 
 namespace wheelwright::study {
 

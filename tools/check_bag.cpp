@@ -14,10 +14,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/bag.hpp>
-#include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
+#include "core/error.hpp"
+#include "logs/bag.hpp"
+#include "logs/bag_write.hpp"
+#include "logs/ros_messages.hpp"
 
 namespace {
 

@@ -10,9 +10,7 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 command -v npm >/dev/null || { echo "bag: npm is missing" >&2; exit 2; }
 
-mkdir "$scratch/include"
-ln -s "$PWD" "$scratch/include/wheelwright"
-"${CXX:-g++}" -std=c++20 -O1 -I "$scratch/include" $(pkg-config --cflags eigen3) -o "$scratch/check_bag" \
+"${CXX:-g++}" -std=c++20 -O1 -iquote . $(pkg-config --cflags eigen3) -o "$scratch/check_bag" \
   tools/check_bag.cpp logs/ros_*.cpp logs/mcap_*.cpp logs/bag.cpp logs/bag_files.cpp logs/bag_storage.cpp logs/bag_write.cpp \
   logs/database.cpp files/bytes.cpp files/words.cpp core/words.cpp -lfmt -lz -lzstd -llz4 -lxxhash -lsqlite3 -lfastcdr -lyaml-cpp
 cp tools/check_bag.mjs "$scratch"

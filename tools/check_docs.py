@@ -16,8 +16,9 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import check_layers
+
 ROOT = Path(__file__).resolve().parent.parent
-NOT_OURS = re.compile(r"^(build.*|tests|node_modules)$")
 EIGEN = "Eigen/Core"
 
 
@@ -25,10 +26,10 @@ def included(header, texts):
     """All that `header` includes, itself and through our own headers."""
     found, ahead = set(), [header]
     while ahead:
-        for name in re.findall(r"^#include <([^>]+)>", texts.get(ahead.pop(), ""), re.MULTILINE):
+        for name in re.findall(r"^#include [<\"]([^>\"]+)[>\"]", texts.get(ahead.pop(), ""), re.MULTILINE):
             if name not in found:
                 found.add(name)
-                ahead.append(name.removeprefix("wheelwright/"))
+                ahead.append(name)
     return found
 
 
@@ -36,13 +37,13 @@ def main():
     clang = shutil.which("clang++-14") or shutil.which("clang++")
     if not clang:
         sys.exit("docs: clang is missing; tools/setup.sh --ci installs it")
-    texts = {f"{path.parent.name}/{path.name}": path.read_text(encoding="utf-8") for path in sorted(ROOT.glob("*/*.hpp"))
-             if not NOT_OURS.match(path.parent.name)}
+    names = subprocess.run(["git", "ls-files", "*.hpp"], cwd=ROOT, check=True, text=True, capture_output=True).stdout.split()
+    texts = {name: (ROOT / name).read_text(encoding="utf-8") for name in names
+             if check_layers.module_of(name) not in ("tests", "examples")}
     libraries = subprocess.run(["pkg-config", "--cflags-only-I", "eigen3", "hdf5", "python3"], check=True, text=True,
                                capture_output=True).stdout.replace("-I", "-isystem ").split()
     with tempfile.TemporaryDirectory() as scratch:
-        os.symlink(ROOT, f"{scratch}/wheelwright")
-        call = [clang, "-std=c++20", "-Wdocumentation", "-Werror=documentation", "-Wno-documentation-html", "-I", scratch,
+        call = [clang, "-std=c++20", "-Wdocumentation", "-Werror=documentation", "-Wno-documentation-html", "-iquote", ROOT,
                 *libraries]
         compiled = f"{scratch}/eigen.pch"
         subprocess.run([*call, "-x", "c++-header", "-o", compiled, "-"], check=True, text=True,
@@ -51,7 +52,7 @@ def main():
         def fails(header):
             before = ["-include-pch", compiled] if EIGEN in included(header, texts) else []
             done = subprocess.run([*call, *before, "-fsyntax-only", "-x", "c++", "-"], check=False, text=True,
-                                  capture_output=True, input=f"#include <wheelwright/{header}>\n")
+                                  capture_output=True, input=f'#include "{header}"\n')
             if done.returncode != 0:
                 print(f"docs: {header}\n{done.stderr}", file=sys.stderr)
             return done.returncode != 0

@@ -208,7 +208,7 @@ def compile_page(page, include):
     includes = [line for line in lines if line.startswith("#include")]
     source = "\n".join(["#include <vector>", *includes, "void stop();", "void block(double t, std::vector<double> sample) {",
                         *[line for line in lines if line not in includes], "}"])
-    done = subprocess.run(["c++", "-std=c++20", "-fsyntax-only", "-I", include, "-isystem", "/usr/include/eigen3", "-x", "c++",
+    done = subprocess.run(["c++", "-std=c++20", "-fsyntax-only", "-iquote", ROOT, "-I", include, "-isystem", "/usr/include/eigen3", "-x", "c++",
                            "-"], input=source, capture_output=True, text=True, check=False)
     if done.returncode:
         yield f"{page.name}: its C++ does not compile\n{done.stderr}"

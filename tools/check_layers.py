@@ -12,49 +12,91 @@ import sys
 import tempfile
 from pathlib import Path
 
-# Room -> rooms whose headers it may include, its own apart (None: all of them). A room looks down, never up; the rooms of
-# a storey stand in the order in which they may see each other.
-GROUND = ["core", "model", "filter", "bounds", "detector"]
-DOORS = ["files", "logs", "sim", "robots"]
-FIRST = ["identify", "commission", "inference", "doctor"]
-SECOND = ["design", "gap", "study"]
-ROOF = ["words", "results", "export", "report"]
-HOUSE = GROUND + DOORS + FIRST + SECOND + ROOF
-PURE = set(HOUSE) - {"files", "logs", "robots", "results", "export"}
+# Module -> its folder, from the lowest to the highest; a module of a layer sees those before it, the table below takes away
+# what it does not need. CMakeLists.txt lists the same folders, in the order in which they are built.
+LAYERS = [
+    ("on the robot", {
+        "core": "core",
+        "model": "model",
+        "filter": "filter",
+        "bounds": "bounds",
+        "detector": "detector",
+    }),
+    ("formats", {
+        "files": "files",
+        "logs": "logs",
+        "sim": "sim",
+        "robots": "robots",
+    }),
+    ("commissioning", {
+        "identify": "identify",
+        "inference": "inference",
+        "commission": "commission",
+        "doctor": "doctor",
+    }),
+    ("studies", {
+        "design": "design",
+        "gap": "gap",
+        "study": "study",
+    }),
+    ("answers", {
+        "words": "words",
+        "results": "results",
+        "export": "export",
+        "report": "report",
+    }),
+    ("programs", {
+        "app": "app",
+        "python": "python",
+    }),
+    ("tests", {
+        "reality": "reality",
+    }),
+]
+MODULES = {name: folder for _, modules in LAYERS for name, folder in modules.items()}
+PRODUCT = [name for layer, modules in LAYERS for name in modules if layer not in ("programs", "tests")]
+PURE = set(PRODUCT) - {"files", "logs", "robots", "results", "export"}
+BY_FOLDER = sorted(MODULES.items(), key=lambda item: -len(item[1]))
 
 
-def below(room):
-    """What stands before `room` and opens no file: who computes is handed what was read."""
-    return set(HOUSE[: HOUSE.index(room)]) & (PURE if room in PURE else set(HOUSE))
+def module_of(path):
+    """The module that holds `path` (from the root, with slashes); of other files the first folder, "" of those on top."""
+    for name, folder in BY_FOLDER:
+        if path.startswith(folder + "/"):
+            return name
+    return path.split("/")[0] if "/" in path else ""
 
 
+def below(module):
+    """What stands before `module` and opens no file: who computes is handed what was read."""
+    return set(PRODUCT[: PRODUCT.index(module)]) & (PURE if module in PURE else set(PRODUCT))
+
+
+ROBOT = set(LAYERS[0][1])
 MAY_INCLUDE = {
-    **{room: below(room) for room in HOUSE},
+    **{module: below(module) for module in PRODUCT},
     "bounds": {"core"},
     "files": {"core"},
     "logs": {"core", "files"},
     "sim": {"core", "model"},
     "identify": {"core", "model", "filter"},
-    "commission": set(GROUND) | {"identify"},
-    "inference": set(GROUND) | {"identify", "commission"},
-    "doctor": set(GROUND) | {"identify", "commission", "inference"},
-    "export": set(GROUND) | {"files", "robots"},
+    "inference": ROBOT | {"identify", "commission"},
+    "commission": ROBOT | {"identify"},
+    "doctor": ROBOT | {"identify", "commission", "inference"},
+    "export": ROBOT | {"files", "robots"},
     "app": None,
     "python": None,
     "reality": {"core", "files", "logs"},
-    "tests": None,
-    "examples": None,
-    "bench": None,
 }
 
-# Rooms whose namespace is not called as they are.
+# Modules whose namespace is not called as they are.
 SPACE = {"export": "exporter"}
 
-# Results are functions of their arguments (seeds are arguments); doors and roof open files.
+# Results are functions of their arguments (seeds are arguments); formats, results and programs open files.
 BANNED_HEADERS = {
-    "fstream": "only doors and results open files",
+    "fstream": "only formats and results open files",
     "iostream": "results are returned, not printed",
-    "filesystem": "only doors and results open files",
+    "filesystem": "only formats and results open files",
     "chrono": "no clock here",
     "ctime": "no clock here",
     "time.h": "no clock here",
@@ -69,16 +111,16 @@ BANNED_CODE = {
     r"\bstd::(?:time|clock)\s*\(": "no clock here",
     r"\bstd::(?:cout|cerr|clog)\b": "results are returned, not printed",
     r"\bf?printf\s*\(": "results are returned, not printed",
-    r"\bfopen\s*\(": "only doors and results open files",
+    r"\bfopen\s*\(": "only formats and results open files",
 }
 
-# Third-party headers that belong to some rooms only: pattern -> (rooms, why).
+# Third-party headers that belong to some modules only: pattern -> (modules, why).
 OUTSIDE = {
     r"ceres/|nlopt": ({"identify", "inference", "design", "gap"}, "solvers stay where they are used"),
-    r"[Cc]lp|[Cc]oin": (set(), "CLP is a peer in bench"),
-    r"mpi\.h$": ({"study"}, "one room shares work out"),
-    r"yaml-cpp/": ({"files", "logs", "robots", "results", "app"}, "text is read at the doors"),
-    r"nlohmann/": ({"files", "logs", "robots", "results", "app", "report"}, "text is read at the doors"),
+    r"[Cc]lp|[Cc]oin": (set(), "CLP is a peer in benchmarks"),
+    r"mpi\.h$": ({"study"}, "one module shares work out"),
+    r"yaml-cpp/": ({"files", "logs", "robots", "results", "app"}, "text is read in formats and results"),
+    r"nlohmann/": ({"files", "logs", "robots", "results", "app", "report"}, "text is read in formats and results"),
 }
 SOLVERS_IN_SOURCES_ONLY = r"ceres/|nlopt|[Cc]lp|[Cc]oin|mpi\.h$"
 
@@ -90,7 +132,10 @@ TEXT = CODE | {".md", ".yaml", ".yml", ".json", ".txt", ".cff", ".bib", ".in", "
 SKIP = re.compile(r"^(?:\.git|\.cache|build.*|node_modules|out|__pycache__)$")
 # A type that is defined in two headers of one namespace is two types of one name to the linker, which keeps one of them.
 TYPE = re.compile(r"^(?:(?:struct|class|enum class|enum)\s+(\w+)\b(?!\s*<)[^;]*$|using\s+(\w+)\s*=)", re.M)
-INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+# Programs that use the installed library, or stand for one.
+USERS = re.compile(r"(?:examples|tests/consumer)/")
+GENERATED = {"report_assets.hpp"}
 
 
 def files(root):
@@ -108,64 +153,71 @@ def without_comments(text):
     return re.sub(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"', blank, text, flags=re.S)
 
 
-def check_code(room, relative, text, report):
+def check_code(module, relative, text, report):
+    user = USERS.match(relative.as_posix())
     for number, line in enumerate(text.splitlines(), 1):
         match = INCLUDE.match(line)
         if not match:
             continue
-        header = match.group(1)
-        ours = re.match(r"wheelwright/(\w+)/", header)
-        if ours and room in MAY_INCLUDE:
-            allowed = MAY_INCLUDE[room]
-            if allowed is not None and ours.group(1) != room and ours.group(1) not in allowed:
-                report(relative, number, f"{room}/ may not include {header}")
-        if room in PURE and header in BANNED_HEADERS and (relative.as_posix(), header) not in EXCEPTIONS:
-            report(relative, number, f"<{header}> in {room}/: {BANNED_HEADERS[header]}")
-        if room in HOUSE:
-            for pattern, (rooms, why) in OUTSIDE.items():
-                if re.match(pattern, header) and room not in rooms:
-                    report(relative, number, f"<{header}> in {room}/: {why}")
+        sign, header = match.groups()
+        owner = module_of(header) if sign == '"' else None
+        if owner in MODULES and module in MAY_INCLUDE:
+            allowed = MAY_INCLUDE[module]
+            if allowed is not None and owner != module and owner not in allowed:
+                report(relative, number, f"{module} may not include {header}, which is of {owner}")
+        if sign == "<" and header.startswith("wheelwright/") and not user:
+            report(relative, number, f'<{header}>: sources here include "{header.removeprefix("wheelwright/")}"')
+        if sign == '"' and owner in MODULES and user:
+            report(relative, number, f'"{header}": a program that uses the library includes <wheelwright/{header}>')
+        if sign == '"' and "/" not in header and not user and header not in GENERATED:
+            report(relative, number, f'"{header}": expected its path from the root of the repository')
+        if module in PURE and header in BANNED_HEADERS and (relative.as_posix(), header) not in EXCEPTIONS:
+            report(relative, number, f"<{header}> in {module}: {BANNED_HEADERS[header]}")
+        if module in PRODUCT and sign == "<":
+            for pattern, (modules, why) in OUTSIDE.items():
+                if re.match(pattern, header) and module not in modules:
+                    report(relative, number, f"<{header}> in {module}: {why}")
             if relative.suffix == ".hpp" and re.match(SOLVERS_IN_SOURCES_ONLY, header):
                 report(relative, number, f"<{header}> in a header: solvers belong in .cpp files")
-    if room in PURE:
+    if module in PURE:
         for number, line in enumerate(without_comments(text).splitlines(), 1):
             for pattern, why in BANNED_CODE.items():
                 found = re.search(pattern, line)
                 if found:
-                    report(relative, number, f"{found.group(0).strip()} in {room}/: {why}")
+                    report(relative, number, f"{found.group(0).strip()} in {module}: {why}")
     if relative.suffix == ".hpp" and not re.search(r"^#pragma once$", text, re.M):
         report(relative, 1, "no #pragma once")
 
 
-def check_space(room, relative, text, report):
-    """Code of a room is in the room's namespace; in wheelwright itself stands what a header lends it."""
-    space = "wheelwright::" + SPACE.get(room, room)
+def check_space(module, relative, text, report):
+    """Code of a module is in the module's namespace; in wheelwright itself stands what a header lends it."""
+    space = "wheelwright::" + SPACE.get(module, module)
     for opened in re.finditer(r"^namespace (wheelwright(?:::\w+)*) \{\n", text, re.M):
         lent = relative.suffix == ".hpp" and re.compile(r"(?:(?:using \w+|namespace \w+ = \w+)::\w+;\n)+\}").match(text, opened.end())
         if not f"{opened.group(1)}::".startswith(f"{space}::") and not (opened.group(1) == "wheelwright" and lent):
-            report(relative, text[: opened.start()].count("\n") + 1, f"namespace {opened.group(1)} in {room}/: expected {space}")
+            report(relative, text[: opened.start()].count("\n") + 1, f"namespace {opened.group(1)} in {module}: expected {space}")
 
 
-def check_links(room, relative, text, report):
-    """What the room's CMakeLists.txt links is what the table lets it include."""
-    allowed = MAY_INCLUDE[room]
+def check_links(module, relative, text, report):
+    """What the module's CMakeLists.txt links is what the table lets it include."""
+    allowed = MAY_INCLUDE[module]
     used = re.search(r"\bUSES\s+([a-z_\s]+)", text)
     if allowed is None or not used:
         return
     number = text[: used.start()].count("\n") + 1
     for other in used.group(1).split():
-        if other != room and other not in allowed:
-            report(relative, number, f"{room}/ may not use {other}")
+        if other != module and other not in allowed:
+            report(relative, number, f"{module} may not use {other}")
 
 
 def listed_headers(root, kinds):
-    """room -> headers after the words `kinds` in its CMakeLists.txt; rooms without any are not in it."""
+    """module -> headers, from the root, after the words `kinds` in its CMakeLists.txt; modules without any are not in it."""
     headers = {}
-    for room in HOUSE:
-        path = root / room / "CMakeLists.txt"
+    for module in PRODUCT:
+        path = root / MODULES[module] / "CMakeLists.txt"
         if path.is_file():
-            for listed in re.findall(rf"\b(?:{kinds})\s+((?:[\w.]+\.hpp\s*)+)", path.read_text(encoding="utf-8")):
-                headers.setdefault(room, set()).update(listed.split())
+            for listed in re.findall(rf"\b(?:{kinds})\s+((?:[\w./]+\.hpp\s*)+)", path.read_text(encoding="utf-8")):
+                headers.setdefault(module, set()).update(f"{MODULES[module]}/{name}" for name in listed.split())
     return headers
 
 
@@ -174,24 +226,39 @@ def installed_headers(root):
 
 
 def public_headers(root):
-    """Those that other rooms may include: installed, or shared with the rooms above."""
+    """Those that other modules may include: installed, or shared with the modules above."""
     return listed_headers(root, "HEADERS|SHARED")
 
 
-def check_private(room, relative, text, public, installed, report):
-    """Headers that no list names are their own room's; tests and benchmarks may look into every room. What is installed
+def check_private(module, relative, text, public, installed, report):
+    """Headers that no list names are their own module's; tests and tools may look into every module. What is installed
     includes what is installed."""
-    if room in ("tests", "bench", "tools", "fuzz"):
+    if relative.parts[0] in ("tests", "tools", "bench", "fuzz") and module != "reality":
         return
-    lent = relative.name in installed.get(room, ())
+    lent = relative.as_posix() in installed.get(module, ())
     for number, line in enumerate(text.splitlines(), 1):
-        ours = re.match(r'^\s*#\s*include\s*<wheelwright/(\w+)/([\w.]+)>', line)
-        if not ours or ours.group(1) not in public:
+        match = INCLUDE.match(line)
+        header = match and match.group(2).removeprefix("wheelwright/")
+        owner = header and module_of(header)
+        if owner not in public:
             continue
-        if ours.group(1) != room and ours.group(2) not in public[ours.group(1)]:
-            report(relative, number, f"{ours.group(1)}/{ours.group(2)} is private to its room")
-        elif lent and ours.group(2) not in installed.get(ours.group(1), ()):
-            report(relative, number, f"{ours.group(1)}/{ours.group(2)} is not installed, {relative} is")
+        if owner != module and header not in public[owner]:
+            report(relative, number, f"{header} is private to {owner}")
+        elif lent and header not in installed.get(owner, ()):
+            report(relative, number, f"{header} is not installed, {relative} is")
+
+
+def check_list(root, report):
+    """The folders that CMakeLists.txt builds are those of the table."""
+    path = root / "CMakeLists.txt"
+    if not path.is_file():
+        return
+    text = path.read_text(encoding="utf-8")
+    listed = re.search(r"set\(WHEELWRIGHT_ROOMS\s([^)]*)\)", text)
+    number = text[: listed.start()].count("\n") + 1 if listed else 1
+    folders = set(listed.group(1).split()) if listed else set()
+    for folder in sorted(folders ^ set(MODULES.values())):
+        report(path.relative_to(root), number, f"{folder} stands in one of WHEELWRIGHT_ROOMS and tools/check_layers.py only")
 
 
 def check_types(relative, text, types, report):
@@ -208,9 +275,10 @@ def check(root):
     types = {}
     public, installed = public_headers(Path(root)), installed_headers(Path(root))
     report = lambda path, line, message: findings.append(f"{path}:{line}: {message}")
+    check_list(Path(root), report)
     for path in files(root):
         relative = path.relative_to(root)
-        room = relative.parts[0] if len(relative.parts) > 1 else ""
+        module = module_of(relative.as_posix())
         try:
             text = path.read_text(encoding="utf-8")
         except UnicodeDecodeError:
@@ -226,58 +294,66 @@ def check(root):
             if named:
                 report(relative, number, f"names {named.group(0)}, a path of one machine")
         if path.suffix in (".hpp", ".cpp"):
-            check_code(room, relative, text, report)
-            check_private(room, relative, text, public, installed, report)
-            if room in (*HOUSE, "app", "python", "reality"):
-                check_space(room, relative, text, report)
-        if path.suffix == ".hpp" and room in HOUSE:
+            check_code(module, relative, text, report)
+            check_private(module, relative, text, public, installed, report)
+            if module in MODULES:
+                check_space(module, relative, text, report)
+        if path.suffix == ".hpp" and module in PRODUCT:
             check_types(relative, text, types, report)
-        if path.name == "CMakeLists.txt" and room in MAY_INCLUDE:
-            check_links(room, relative, text, report)
+        if path.name == "CMakeLists.txt" and module in MAY_INCLUDE:
+            check_links(module, relative, text, report)
     return findings
 
 
 def self_test():
     spdx = "// SPDX-License-Identifier: Apache-2.0\n"
     head = spdx + "#pragma once\n"
+    # A module's name behind @ stands for its folder.
+    placed = lambda text: re.sub(r'@(\w+)/', lambda m: MODULES[m[1]] + '/', text)
     clean = {
-        "core/a.hpp": head + "#include <vector>\n// a random comment on rand() and std::cout\nstruct A {\n};\n",
-        "bounds/b.hpp": head + "#include <wheelwright/core/a.hpp>\nstruct A;\nstruct B {};\nstruct B<2> {};\n",
-        "model/m.hpp": head + "namespace wheelwright::model {\nint f();\n}\n\nnamespace wheelwright {\nusing model::f;\n}\n",
-        "files/c.cpp": spdx + "#include <fstream>\n#include <wheelwright/core/a.hpp>\n",
-        "inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
-        "study/work_on_ranks.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
-        "detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
-        "filter/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",
-        "detector/shared.cpp": spdx + "#include <wheelwright/filter/s.hpp>\n",
+        "@core/a.hpp": head + "#include <vector>\n// a random comment on rand() and std::cout\nstruct A {\n};\n",
+        "@bounds/b.hpp": head + '#include "@core/a.hpp"\nstruct A;\nstruct B {};\nstruct B<2> {};\n',
+        "@model/m.hpp": head + "namespace wheelwright::model {\nint f();\n}\n\nnamespace wheelwright {\nusing model::f;\n}\n",
+        "@files/c.cpp": spdx + '#include <fstream>\n#include "@core/a.hpp"\n',
+        "@inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
+        "@study/work_on_ranks.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
+        "@detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
+        "@filter/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",
+        "@detector/shared.cpp": spdx + '#include "@filter/s.hpp"\n',
+        "examples/e.cpp": spdx + "#include <wheelwright/core/a.hpp>\n",
         "docs/framework.md": "framework/works on http://host/working and a/" + "work\n",
     }
     violations = {
-        "upward include": ("bounds/x.hpp", head + "#include <wheelwright/filter/b.hpp>\n"),
-        "commission in identify": ("identify/x.cpp", spdx + "#include <wheelwright/commission/s.hpp>\n"),
-        "roof in a door": ("logs/x.cpp", spdx + "#include <wheelwright/report/s.hpp>\n"),
-        "door in report": ("report/x.cpp", spdx + "#include <wheelwright/robots/s.hpp>\n"),
-        "private header": ("detector/y.cpp", spdx + "#include <wheelwright/filter/b.hpp>\n#include <wheelwright/filter/c.hpp>\n"),
-        "not installed": ("filter/a.hpp", head + "#include <wheelwright/filter/s.hpp>\n"),
-        "linked upwards": ("identify/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(identify\n  USES core bounds)\n"),
-        "another room's namespace": ("bounds/x.cpp", spdx + "namespace wheelwright::core {\n}\n"),
-        "no room's namespace": ("bounds/x.hpp", head + "namespace wheelwright {\nint f();\n}\n"),
-        "file opened": ("commission/x.cpp", spdx + "#include <fstream>\n"),
-        "printing": ("filter/x.cpp", spdx + "void f() { std::cout << 1; }\n"),
-        "clock": ("identify/x.cpp", spdx + "#include <chrono>\n"),
-        "another clock": ("study/work_on_ranks.hpp", head + "#include <chrono>\n"),
-        "MPI in a header": ("study/x.hpp", head + "#include <mpi.h>\n"),
-        "MPI elsewhere": ("logs/x.cpp", spdx + "#include <mpi.h>\n"),
-        "device": ("sim/x.cpp", spdx + "std::random_device device;\n"),
-        "rand": ("sim/x.cpp", spdx + "int f() { return rand(); }\n"),
-        "solver in header": ("identify/x.hpp", head + "#include <nlopt.hpp>\n"),
-        "CLP in a room": ("bounds/x.cpp", spdx + "#include <CoinPackedMatrix.hpp>\n"),
-        "solver elsewhere": ("detector/x.cpp", spdx + "#include <nlopt.hpp>\n"),
-        "no licence": ("core/x.cpp", "int x;\n"),
+        "upward include": ("@bounds/x.hpp", head + '#include "@filter/b.hpp"\n'),
+        "commission in identify": ("@identify/x.cpp", spdx + '#include "@commission/s.hpp"\n'),
+        "an answer in a format": ("@logs/x.cpp", spdx + '#include "@report/s.hpp"\n'),
+        "a format in report": ("@report/x.cpp", spdx + '#include "@robots/s.hpp"\n'),
+        "private header": ("@detector/y.cpp", spdx + '#include "@filter/b.hpp"\n#include "@filter/c.hpp"\n'),
+        "not installed": ("@filter/a.hpp", head + '#include "@filter/s.hpp"\n'),
+        "linked upwards": ("@identify/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(identify\n  USES core bounds)\n"),
+        "another module's namespace": ("@bounds/x.cpp", spdx + "namespace wheelwright::core {\n}\n"),
+        "no module's namespace": ("@bounds/x.hpp", head + "namespace wheelwright {\nint f();\n}\n"),
+        "our header by the installed name": ("@bounds/x.cpp", spdx + "#include <wheelwright/core/a.hpp>\n"),
+        "our header by its place in an example": ("examples/x.cpp", spdx + '#include "@core/a.hpp"\n'),
+        "a header without its folder": ("@bounds/x.cpp", spdx + '#include "b.hpp"\n'),
+        "a folder that is not built": ("CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nset(WHEELWRIGHT_ROOMS " +
+                                       " ".join(list(MODULES.values())[1:]) + ")\n"),
+        "file opened": ("@commission/x.cpp", spdx + "#include <fstream>\n"),
+        "printing": ("@filter/x.cpp", spdx + "void f() { std::cout << 1; }\n"),
+        "clock": ("@identify/x.cpp", spdx + "#include <chrono>\n"),
+        "another clock": ("@study/work_on_ranks.hpp", head + "#include <chrono>\n"),
+        "MPI in a header": ("@study/x.hpp", head + "#include <mpi.h>\n"),
+        "MPI elsewhere": ("@logs/x.cpp", spdx + "#include <mpi.h>\n"),
+        "device": ("@sim/x.cpp", spdx + "std::random_device device;\n"),
+        "rand": ("@sim/x.cpp", spdx + "int f() { return rand(); }\n"),
+        "solver in header": ("@identify/x.hpp", head + "#include <nlopt.hpp>\n"),
+        "CLP in a module": ("@bounds/x.cpp", spdx + "#include <CoinPackedMatrix.hpp>\n"),
+        "solver elsewhere": ("@detector/x.cpp", spdx + "#include <nlopt.hpp>\n"),
+        "no licence": ("@core/x.cpp", "int x;\n"),
         "no licence in a script": ("tools/x", "#!/bin/sh\ntrue\n"),
-        "one name, two types": ("detector/x.hpp", head + "class A final {\n};\n"),
-        "one name, a type and an alias": ("detector/x.hpp", head + "using A = int;\n"),
-        "no guard": ("core/x.hpp", spdx),
+        "one name, two types": ("@detector/x.hpp", head + "class A final {\n};\n"),
+        "one name, a type and an alias": ("@detector/x.hpp", head + "using A = int;\n"),
+        "no guard": ("@core/x.hpp", spdx),
         "private path": ("docs/x.md", "see /" + "work/main\n"),
         "another private path": ("examples/x.yaml", "log: /" + "tmp/bash_jobs.0/x\n"),
     }
@@ -286,9 +362,9 @@ def self_test():
     def tree(extra):
         with tempfile.TemporaryDirectory() as root:
             for name, text in {**clean, **extra}.items():
-                path = Path(root) / name
+                path = Path(root) / placed(name)
                 path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(text, encoding="utf-8")
+                path.write_text(placed(text), encoding="utf-8")
             return check(Path(root))
 
     found = tree({})
@@ -297,7 +373,7 @@ def self_test():
         print("clean tree:", *found, sep="\n  ")
     for what, (name, text) in violations.items():
         found = tree({name: text})
-        if len(found) != 1 or not found[0].startswith(name + ":"):
+        if len(found) != 1 or not found[0].startswith(placed(name) + ":"):
             failures += 1
             print(f"{what}: expected one finding in {name}, got", *(found or ["none"]), sep="\n  ")
     print(f"{len(violations) + 1 - failures} passed, {failures} failed")

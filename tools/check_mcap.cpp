@@ -10,8 +10,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/mcap.hpp>
+#include "core/error.hpp"
+#include "logs/mcap.hpp"
 
 namespace {
 

@@ -9,9 +9,7 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 command -v npm >/dev/null || { echo "mcap: npm is missing" >&2; exit 2; }
 
-mkdir "$scratch/include"
-ln -s "$PWD" "$scratch/include/wheelwright"
-"${CXX:-g++}" -std=c++20 -O1 -I "$scratch/include" -o "$scratch/check_mcap" tools/check_mcap.cpp logs/mcap_*.cpp \
+"${CXX:-g++}" -std=c++20 -O1 -iquote . -o "$scratch/check_mcap" tools/check_mcap.cpp logs/mcap_*.cpp \
   files/bytes.cpp files/words.cpp -lfmt -lz -lzstd -llz4 -lxxhash
 cp tools/check_mcap.mjs "$scratch"
 cd "$scratch"

@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 import check_layers  # noqa: E402
 
-PRODUCT = [*check_layers.HOUSE, "app", "python", "reality"]
+PRODUCT = list(check_layers.MODULES)
 
 
 def counts_of(folder, root):
@@ -67,7 +67,7 @@ def table(counts):
     """Markdown: lines that can run and the share of them that did, by room and of all."""
     rooms = {room: [0, 0] for room in PRODUCT}
     for name, lines in counts.items():
-        room = rooms[name.split("/")[0]]
+        room = rooms[check_layers.module_of(name)]
         room[0] += len(lines)
         room[1] += sum(count != 0 for count in lines.values())
     rows = ["| room | lines | did not run | ran |", "|---|---|---|---|"]
@@ -81,7 +81,7 @@ def table(counts):
 def uncovered(counts):
     """(file, first, last) of what did not run, with nothing that ran in between; rooms in their order, then by name."""
     found = []
-    for name in sorted(counts, key=lambda name: (PRODUCT.index(name.split("/")[0]), name)):
+    for name in sorted(counts, key=lambda name: (PRODUCT.index(check_layers.module_of(name)), name)):
         open_one = None
         for number, count in sorted(counts[name].items()):
             if count:
@@ -152,7 +152,7 @@ def main():
     if not counts:
         sys.exit(f"coverage: no counts in {arguments.folder}: build it with the preset `coverage`")
     if arguments.room:
-        counts = {name: lines for name, lines in counts.items() if name.split("/")[0] in arguments.room}
+        counts = {name: lines for name, lines in counts.items() if check_layers.module_of(name) in arguments.room}
     print(table(counts))
     if arguments.uncovered or arguments.source:
         print()

@@ -144,21 +144,21 @@ def about(header):
 def api(tags):
     pages = {}
     for compound in ElementTree.parse(tags).getroot().iterfind("compound[@kind='file']"):
-        place = compound.findtext("path", "").rstrip("/").split("/")[-1]
+        place = os.path.relpath(compound.findtext("path", ""), ROOT)
         pages[f"{place}/{compound.findtext('name')}"] = compound.findtext("filename", "")
     out = ("# C++ library\n\nOne target for each room: `find_package(Wheelwright 0.1 REQUIRED COMPONENTS detector)`, then "
            "`target_link_libraries(… Wheelwright::detector)`. Headers are `<wheelwright/ROOM/HEADER>`. "
            '<a href="../api/index.html">All pages</a>, <a href="../api/annotated.html">all types</a>.\n')
     public = check_layers.public_headers(ROOT)
     for room, what in ROOMS.items():
-        headers = sorted(ROOT / room / name for name in public.get(room, ()))
+        headers = sorted(public.get(room, ()))
         if not headers:
             continue
         out += f"\n## {room}\n\n{what[0].upper() + what[1:]}.\n\n| header | |\n|---|---|\n"
         for header in headers:
-            page = pages.get(f"{room}/{header.name}")
+            page = pages.get(header)
             assert page, f"{header}: Doxygen has no page of it"
-            out += f'| <a href="../api/{page}">{header.name}</a> | {cell(about(header))} |\n'
+            out += f'| <a href="../api/{page}">{header}</a> | {cell(about(ROOT / header))} |\n'
     return out
 
 

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 import check_layers  # noqa: E402
 
-PRODUCT = [*check_layers.HOUSE, "app", "python", "reality"]
+PRODUCT = list(check_layers.MODULES)
 READERS = {"files", "logs", "robots", "results"}
 WIDTH = 120
 TWIN_LINES = 8
@@ -34,7 +34,7 @@ def tracked(root):
 
 
 def room_of(name):
-    return name.split("/")[0]
+    return check_layers.module_of(name)
 
 
 def lines_of(files, rooms):
@@ -43,10 +43,10 @@ def lines_of(files, rooms):
 
 def installed(root, files):
     """Headers that are installed, and those of them that no other room, binding or example includes."""
-    public = {f"{room}/{name}" for room, names in check_layers.installed_headers(root).items() for name in names}
+    public = set().union(*check_layers.installed_headers(root).values())
     users = defaultdict(set)
     for name, text in files.items():
-        for header in re.findall(r"#include <wheelwright/([\w/]+\.hpp)>", text):
+        for header in re.findall(r'#include (?:<wheelwright/|")([\w/]+\.hpp)[>"]', text):
             users[header].add(name)
     reached = {header for header in public
                if any(room_of(user) not in (room_of(header), "tests", "bench", "tools") for user in users[header])}

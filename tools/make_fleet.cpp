@@ -18,12 +18,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "core/error.hpp"
+#include "core/log.hpp"
+#include "files/bytes.hpp"
+#include "logs/log_file.hpp"
+#include "robots/robot_file.hpp"
+#include "sim/simulation.hpp"
 
 namespace {
 

@@ -14,15 +14,14 @@ cd "$(dirname "$0")/.."
 work=$(mktemp -d)
 trap 'rm -rf --one-file-system "$work"' EXIT
 cp -r core bounds detector tests "$work"
-mkdir -p "$work/include" "$work/o"
-ln -s "$work" "$work/include/wheelwright"
+mkdir "$work/o"
 compiler=${CXX:-g++}
 command -v ccache >/dev/null && compiler="ccache $compiler"
 
 # compile SOURCE: into o/SOURCE.o, with the flags of the build that matter for rounding.
 cat >"$work/compile" <<'END'
 case $1 in *avx2*) more=-mavx2 ;; *avx512*) more="-mavx512f -mavx512dq" ;; *) more= ;; esac
-$COMPILER -std=c++20 -O1 -DNDEBUG -ffp-contract=off $more -Iinclude -Itests -isystem /usr/include/eigen3 -c "$1" \
+$COMPILER -std=c++20 -O1 -DNDEBUG -ffp-contract=off $more -iquote . -isystem /usr/include/eigen3 -c "$1" \
   -o "o/$(echo "$1" | tr / _).o" 2>"o/$(echo "$1" | tr / _).log"
 END
 # run PROGRAM: builds and runs one of the test programs; 0 passed, 1 failed, 2 does not compile.

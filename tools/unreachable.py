@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 import check_layers  # noqa: E402
 
-PRODUCT = [*check_layers.HOUSE, "app", "python", "reality"]
+PRODUCT = list(check_layers.MODULES)
 # What these name stays: they show or measure what embedders may use.
 KEPT = ["examples/*.cpp", "tests/consumer/*.cpp", "tools/*.cpp", "docs/embedding.md", "docs/own_effect.md"]
 SECTIONS = "-O0 -g1 -w -ffunction-sections -fdata-sections"
@@ -208,7 +208,7 @@ def is_accessor(texts, place):
 def table(found):
     rooms = defaultdict(set)
     for name, first, last, _ in found:
-        rooms[name.split("/")[0]].update((name, line) for line in range(first, last + 1))
+        rooms[check_layers.module_of(name)].update((name, line) for line in range(first, last + 1))
     lines = [f"{len(at):6,}  {room}" for room, at in sorted(rooms.items(), key=lambda item: -len(item[1]))]
     lines.append(f"{sum(map(len, rooms.values())):6,}  lines that nothing reaches, in {len(found)} places")
     lines += [f"{name}:{first}-{last}: {title}" for name, first, last, title in found]
@@ -253,7 +253,7 @@ def main():
         self_test()
         return
     tracked = run("git", "-C", ROOT, "ls-files", "*.hpp", "*.cpp", stdout=subprocess.PIPE).stdout.split()
-    texts = {name: (ROOT / name).read_text(encoding="utf-8") for name in tracked if name.split("/")[0] in PRODUCT}
+    texts = {name: (ROOT / name).read_text(encoding="utf-8") for name in tracked if check_layers.module_of(name) in PRODUCT}
     others = [path.read_text(encoding="utf-8") for pattern in KEPT for path in sorted(ROOT.glob(pattern))]
     found = unused_names(texts, others)
     if not arguments.names:

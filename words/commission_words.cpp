@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/commission_words.hpp>
+#include "words/commission_words.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,12 +8,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/at_risk.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/commission/pose_at_risk.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/words/detect_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "commission/at_risk.hpp"
+#include "commission/physical.hpp"
+#include "commission/pose_at_risk.hpp"
+#include "core/statistics.hpp"
+#include "words/detect_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::words {
 namespace {

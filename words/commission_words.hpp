@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
+#include "commission/commission.hpp"
 
 namespace wheelwright::words {
 

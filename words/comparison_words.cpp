@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/comparison_words.hpp>
+#include "words/comparison_words.hpp"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "core/words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::words {
 namespace {

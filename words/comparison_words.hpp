@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/model_comparison.hpp>
+#include "commission/model_comparison.hpp"
 
 namespace wheelwright::words {
 

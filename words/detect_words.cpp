@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/detect_words.hpp>
+#include "words/detect_words.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/words/commission_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "core/limits.hpp"
+#include "core/words.hpp"
+#include "words/commission_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::words {
 namespace {

@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/commission/detector_choice.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/incident_watch.hpp>
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/words/text.hpp>
+#include "commission/detector_choice.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/incident_watch.hpp"
+#include "commission/margin_survey.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::words {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/gap_words.hpp>
+#include "words/gap_words.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/where.hpp>
-#include <wheelwright/words/text.hpp>
+#include "gap/effect.hpp"
+#include "gap/where.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::words {
 

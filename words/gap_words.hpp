@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/effect.hpp>
+#include "gap/diagnosis.hpp"
+#include "gap/effect.hpp"
 
 namespace wheelwright::words {
 

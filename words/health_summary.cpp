@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/words/detect_words.hpp>
-#include <wheelwright/words/summary.hpp>
+#include "words/detect_words.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::words {
 namespace {

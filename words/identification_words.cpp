@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/identification_words.hpp>
+#include "words/identification_words.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/identify/noise_level.hpp>
+#include "core/statistics.hpp"
+#include "core/words.hpp"
+#include "identify/noise_level.hpp"
 
 namespace wheelwright::words {
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/inference/identification.hpp>
+#include "commission/physical.hpp"
+#include "inference/identification.hpp"
 
 namespace wheelwright::words {
 

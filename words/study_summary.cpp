@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/summary.hpp>
+#include "words/summary.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,14 +9,14 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/gap/where.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/words/detect_words.hpp>
-#include <wheelwright/words/gap_words.hpp>
-#include <wheelwright/words/identification_words.hpp>
-#include <wheelwright/words/text.hpp>
+#include "commission/physical.hpp"
+#include "core/words.hpp"
+#include "gap/where.hpp"
+#include "identify/noise_level.hpp"
+#include "words/detect_words.hpp"
+#include "words/gap_words.hpp"
+#include "words/identification_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::words {
 namespace {

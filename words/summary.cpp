@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/summary.hpp>
+#include "words/summary.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,12 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/commission/assumptions.hpp>
-#include <wheelwright/commission/physical.hpp>
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-#include <wheelwright/words/commission_words.hpp>
-#include <wheelwright/words/detect_words.hpp>
+#include "commission/assumptions.hpp"
+#include "commission/physical.hpp"
+#include "core/statistics.hpp"
+#include "identify/noise_level.hpp"
+#include "words/commission_words.hpp"
+#include "words/detect_words.hpp"
 
 namespace wheelwright::words {
 namespace {

@@ -7,21 +7,21 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/blind_watch.hpp>
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_choice.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/incident_watch.hpp>
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/design/detection.hpp>
-#include <wheelwright/design/manoeuvre.hpp>
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/gap/diagnosis.hpp>
-#include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/inference/identification.hpp>
-#include <wheelwright/study/bound_derivatives.hpp>
-#include <wheelwright/study/fleet_result.hpp>
-#include <wheelwright/study/study.hpp>
+#include "commission/blind_watch.hpp"
+#include "commission/commission.hpp"
+#include "commission/detector_choice.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/incident_watch.hpp"
+#include "commission/risk_watch.hpp"
+#include "design/detection.hpp"
+#include "design/manoeuvre.hpp"
+#include "doctor/log_health.hpp"
+#include "gap/diagnosis.hpp"
+#include "gap/discrimination_design.hpp"
+#include "inference/identification.hpp"
+#include "study/bound_derivatives.hpp"
+#include "study/fleet_result.hpp"
+#include "study/study.hpp"
 
 namespace wheelwright::words {
 

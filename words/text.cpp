@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/text.hpp>
+#include "words/text.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/core/words.hpp>
+#include "core/words.hpp"
 
 namespace wheelwright::words {
 

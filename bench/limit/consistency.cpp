@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "limit/consistency.hpp"
+#include "bench/limit/consistency.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
 
-#include <wheelwright/core/check.hpp>
+#include "core/check.hpp"
 
 namespace wheelwright::bench {
 namespace {

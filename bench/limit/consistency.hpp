@@ -50,11 +50,11 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/model/fault_type.hpp>
-#include "limit/raw_equations.hpp"
-#include "limit/separation.hpp"
+#include "bench/limit/raw_equations.hpp"
+#include "bench/limit/separation.hpp"
+#include "bounds/polytope.hpp"
+#include "detector/reference_motion.hpp"
+#include "model/fault_type.hpp"
 
 namespace wheelwright::bench {
 

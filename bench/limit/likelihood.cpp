@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "limit/likelihood.hpp"
+#include "bench/limit/likelihood.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
-#include <wheelwright/core/check.hpp>
-#include "limit/raw_equations.hpp"
+#include "bench/limit/raw_equations.hpp"
+#include "core/check.hpp"
 
 namespace wheelwright::bench {
 namespace {

@@ -20,11 +20,11 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/model/fault_type.hpp>
-#include <wheelwright/model/model.hpp>
+#include "detector/reference_motion.hpp"
+#include "filter/measurement.hpp"
+#include "filter/noise.hpp"
+#include "model/fault_type.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::bench {
 

@@ -26,13 +26,13 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/detector/fault_rows.hpp>
-#include <wheelwright/detector/reference_motion.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/model/fault_type.hpp>
-#include <wheelwright/model/model.hpp>
+#include "core/log.hpp"
+#include "detector/fault_rows.hpp"
+#include "detector/reference_motion.hpp"
+#include "filter/measurement.hpp"
+#include "filter/noise.hpp"
+#include "model/fault_type.hpp"
+#include "model/model.hpp"
 
 namespace wheelwright::bench {
 

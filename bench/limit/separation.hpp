@@ -9,8 +9,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "bounds/polytope.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::bench {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "peers/bank.hpp"
+#include "bench/peers/bank.hpp"
 
 #include <cmath>
 
-#include "peers/confidence_threshold.hpp"
-#include "peers/constant_threshold.hpp"
-#include "peers/cusum.hpp"
-#include "peers/scale_sums.hpp"
-#include "peers/tight_threshold.hpp"
+#include "bench/peers/confidence_threshold.hpp"
+#include "bench/peers/constant_threshold.hpp"
+#include "bench/peers/cusum.hpp"
+#include "bench/peers/scale_sums.hpp"
+#include "bench/peers/tight_threshold.hpp"
 
 namespace wheelwright::peers {
 namespace {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "peers/field.hpp"
-#include "peers/innovations.hpp"
-#include "peers/statistic.hpp"
+#include "bench/peers/field.hpp"
+#include "bench/peers/innovations.hpp"
+#include "bench/peers/statistic.hpp"
 
 namespace wheelwright::peers {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "statistic.hpp"
+#include "bench/peers/statistic.hpp"
 
 namespace wheelwright::peers {
 

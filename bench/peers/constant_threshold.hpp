@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "statistic.hpp"
+#include "bench/peers/statistic.hpp"
 
 namespace wheelwright::peers {
 

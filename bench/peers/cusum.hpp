@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "statistic.hpp"
+#include "bench/peers/statistic.hpp"
 
 namespace wheelwright::peers {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "peers/field.hpp"
+#include "bench/peers/field.hpp"
 
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include <wheelwright/detector/margins.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/identify/least_squares.hpp>
+#include "detector/margins.hpp"
+#include "filter/row_stream.hpp"
+#include "identify/least_squares.hpp"
 
 namespace wheelwright::peers {
 namespace {

@@ -9,12 +9,11 @@
 #include <string_view>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/detector/threshold.hpp>
-#include <wheelwright/model/fault_type.hpp>
-
-#include "detector/detectability.hpp"
-#include "peers/statistic.hpp"
+#include "bench/peers/statistic.hpp"
+#include "commission/commission.hpp"
+#include "detector/threshold.hpp"
+#include "model/fault_type.hpp"
+#include "tests/detector/detectability.hpp"
 
 namespace wheelwright::peers {
 

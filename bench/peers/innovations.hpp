@@ -9,9 +9,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/model/robot.hpp>
-
-#include "statistic.hpp"
+#include "bench/peers/statistic.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::peers {
 

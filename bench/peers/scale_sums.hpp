@@ -3,9 +3,8 @@
 /// The detector at a stated risk, as the study compares it.
 #pragma once
 
-#include <wheelwright/detector/scale_detector.hpp>
-
-#include "statistic.hpp"
+#include "bench/peers/statistic.hpp"
+#include "detector/scale_detector.hpp"
 
 namespace wheelwright::peers {
 

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <span>
 
-#include <wheelwright/filter/regressor_filter.hpp>
+#include "filter/regressor_filter.hpp"
 
 namespace wheelwright::peers {
 

@@ -6,9 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include <wheelwright/detector/threshold.hpp>
-
-#include "statistic.hpp"
+#include "bench/peers/statistic.hpp"
+#include "detector/threshold.hpp"
 
 namespace wheelwright::peers {
 

@@ -3,7 +3,7 @@
 // repaired is repaired, counted and told.
 #include <functional>
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::bad_input_test {
 namespace {

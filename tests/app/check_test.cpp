@@ -4,9 +4,8 @@
 #include <cmath>
 #include <functional>
 
-#include <wheelwright/core/words.hpp>
-
-#include "app/program.hpp"
+#include "core/words.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::check_test {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // wheelwright compare: what was changed in the simulated robot is told and named, what was not is not.
-#include <wheelwright/core/words.hpp>
+#include "core/words.hpp"
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::compare_test {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // `wheelwright convert`, as a user runs it: the same log in every format is the same log.
-#include <wheelwright/core/words.hpp>
+#include "core/words.hpp"
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::convert_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The manoeuvre that tells causes apart, from names and from a gap.json.
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::design_discrimination_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Design a manoeuvre, drive it in simulation, commission its log: three commands in a row.
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::design_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `wheelwright doctor`, as a user runs it.
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::doctor_test {
 namespace {

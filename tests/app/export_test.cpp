@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // wheelwright export: the header of a commissioned model decides as `wheelwright detect` does, and bad wishes are told.
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/results/model_file.hpp>
-
-#include "app/program.hpp"
-#include "support/c_detector.hpp"
+#include "logs/csv.hpp"
+#include "results/model_file.hpp"
+#include "tests/app/program.hpp"
+#include "tests/support/c_detector.hpp"
 
 namespace wheelwright::app::export_test {
 namespace {

@@ -6,7 +6,7 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::fleet_test {
 namespace {

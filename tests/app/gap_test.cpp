@@ -2,11 +2,9 @@
 // `wheelwright gap`, as a user runs it: a simulated robot whose bearings are dry, its plain robot file, a healthy log.
 #include <algorithm>
 
-#include "app/program.hpp"
-
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "robots/simulator_samples.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/app/program.hpp"
+#include "tests/robots/simulator_samples.hpp"
 
 namespace wheelwright::app::gap_test {
 namespace {

@@ -2,7 +2,7 @@
 // `wheelwright identify` as a user runs it.
 #include <cmath>
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::identify_test {
 

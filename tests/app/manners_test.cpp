@@ -5,10 +5,9 @@
 #include <set>
 
 #include "app/common.hpp"
-#include "app/program.hpp"
 #include "app/units.hpp"
-
-#include <wheelwright/files/words.hpp>
+#include "files/words.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::manners_test {
 namespace {

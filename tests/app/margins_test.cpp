@@ -2,7 +2,7 @@
 // `wheelwright margins`, as a user runs it: on the drive that was commissioned with, a pose beside it.
 #include <limits>
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::margins_test {
 namespace {

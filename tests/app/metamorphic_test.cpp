@@ -9,10 +9,9 @@
 
 #include <rapidcheck.h>
 
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-
-#include "app/program.hpp"
+#include "logs/log_file.hpp"
+#include "logs/recorded_log.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::metamorphic_test {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A robot that skids in turns (docs/more_wheels.md): in its kinematics it is one whose track is wider than the tape
 // measure says, here 1.4 times, and whose wheels are 3 % smaller.
-#include <wheelwright/core/words.hpp>
+#include "core/words.hpp"
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::more_wheels_test {
 namespace {

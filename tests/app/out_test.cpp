@@ -5,9 +5,8 @@
 #include <chrono>
 #include <thread>
 
-#include <wheelwright/files/temporary.hpp>
-
-#include "app/program.hpp"
+#include "files/temporary.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::out_test {
 namespace {

@@ -2,10 +2,9 @@
 // What a run reads stays, what it is to write is written or refused, and standard output holds one thing.
 #include <unistd.h>
 
-#include <wheelwright/core/words.hpp>
-
-#include "app/program.hpp"
-#include "app/stock_robots.hpp"
+#include "core/words.hpp"
+#include "tests/app/program.hpp"
+#include "tests/app/stock_robots.hpp"
 
 namespace wheelwright::app::outputs_test {
 namespace {

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::power_cut_test {
 namespace {

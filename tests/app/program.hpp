@@ -16,11 +16,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/json.hpp>
-
-#include "support/scratch.hpp"
-#include "support/skip.hpp"
+#include "files/bytes.hpp"
+#include "files/json.hpp"
+#include "tests/support/scratch.hpp"
+#include "tests/support/skip.hpp"
 
 namespace wheelwright::testing {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Several processes of the program under mpirun.
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::ranks_test {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::results_test {
 

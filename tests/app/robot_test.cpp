@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // wheelwright robot: where the file goes, what stands in it, and what is never written over.
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "robots/robot_samples.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/robots/robot_samples.hpp"
 
 namespace wheelwright::app::robot_test {
 namespace {

@@ -8,9 +8,8 @@
 #include <functional>
 #include <thread>
 
-#include <wheelwright/files/temporary.hpp>
-
-#include "app/program.hpp"
+#include "files/temporary.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::robust_test {
 namespace {

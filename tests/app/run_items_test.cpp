@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "support/scratch.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::app {
 namespace {

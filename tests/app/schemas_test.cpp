@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What convert, export, design, robot and simulate write fits its schema, and the schemas refuse what is not there.
-#include "app/program.hpp"
-#include "robots/robot_samples.hpp"
+#include "tests/app/program.hpp"
+#include "tests/robots/robot_samples.hpp"
 
 namespace wheelwright::app::schemas_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::sensitivity_test {
 namespace {

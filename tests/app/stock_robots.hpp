@@ -14,7 +14,7 @@
 
 #include <fmt/format.h>
 
-#include "logs/ros_cdr.hpp"
+#include "tests/logs/ros_cdr.hpp"
 
 namespace wheelwright::testing {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // `wheelwright try` on recordings of stock robots, and what commands refuse that the doctor calls wrong.
-#include "app/program.hpp"
-#include "app/stock_robots.hpp"
+#include "tests/app/program.hpp"
+#include "tests/app/stock_robots.hpp"
 
 #include <tuple>
 #include <utility>
 
-#include <wheelwright/robots/robot_file.hpp>
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::app::try_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Help, exit codes, and what goes to which stream.
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::usage_test {
 namespace {

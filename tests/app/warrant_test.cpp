@@ -2,7 +2,7 @@
 // Guaranteed is said of what stands on declared bounds, and of nothing else: all that the program says is searched.
 #include <algorithm>
 
-#include "app/program.hpp"
+#include "tests/app/program.hpp"
 
 namespace wheelwright::app::warrant_test {
 namespace {

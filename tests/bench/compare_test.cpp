@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "bench.hpp"
+#include "bench/bench.hpp"
 
 namespace wheelwright::bench::compare_test {
 namespace {

@@ -8,10 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/detector/margins.hpp>
-#include "limit/consistency.hpp"
-
-#include "detector/detectability.hpp"
+#include "bench/limit/consistency.hpp"
+#include "detector/margins.hpp"
+#include "tests/detector/detectability.hpp"
 
 namespace wheelwright::bench::consistency_test {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "limit/likelihood.hpp"
+#include "bench/limit/likelihood.hpp"
 
 namespace wheelwright::bench::likelihood_test {
 namespace {

@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include "../../bench/peers/confidence_threshold.hpp"
-#include "../../bench/peers/cusum.hpp"
-#include "../../bench/peers/innovations.hpp"
-#include "support/random.hpp"
+#include "bench/peers/confidence_threshold.hpp"
+#include "bench/peers/cusum.hpp"
+#include "bench/peers/innovations.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::peers {
 namespace {

@@ -7,9 +7,8 @@
 #include <gtest/gtest.h>
 #include <boost/multiprecision/cpp_int.hpp>
 
-#include <wheelwright/bounds/box.hpp>
-
-#include "bounds/rows.hpp"
+#include "bounds/box.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::box_rounding_test {
 namespace {

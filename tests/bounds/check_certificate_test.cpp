@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The checker of certificates against closed forms and exact oracles: zero tolerance, in both directions.
-#include <wheelwright/bounds/check_certificate.hpp>
+#include "bounds/check_certificate.hpp"
 
 #include <array>
 #include <cmath>
@@ -10,11 +10,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/core/limits.hpp>
-
-#include "bounds/exact.hpp"
-#include "bounds/rows.hpp"
+#include "bounds/feasible_set.hpp"
+#include "core/limits.hpp"
+#include "tests/bounds/exact.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::check_certificate_test {
 

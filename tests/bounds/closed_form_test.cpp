@@ -4,10 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/minimax.hpp>
-
-#include "bounds/rows.hpp"
+#include "bounds/feasible_set.hpp"
+#include "bounds/minimax.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::closed_form_test {
 namespace {

@@ -10,8 +10,8 @@
 
 #include <boost/multiprecision/cpp_int.hpp>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
+#include "bounds/certificate.hpp"
+#include "bounds/slab_rows.hpp"
 
 namespace wheelwright::bounds::exact {
 

@@ -15,10 +15,9 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-
-#include "bounds/qsopt_oracle.hpp"
-#include "bounds/rows.hpp"
+#include "bounds/feasible_set.hpp"
+#include "tests/bounds/qsopt_oracle.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::exact_lp {
 

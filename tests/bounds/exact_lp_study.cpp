@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "bounds/exact_lp.hpp"
+#include "tests/bounds/exact_lp.hpp"
 
 int main(int count, char** arguments) try {
   using namespace wheelwright::bounds::exact_lp;

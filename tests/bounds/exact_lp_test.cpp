@@ -4,9 +4,8 @@
 // thousands of them: exact_lp_study.cpp.
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/minimax.hpp>
-
-#include "bounds/exact_lp.hpp"
+#include "bounds/minimax.hpp"
+#include "tests/bounds/exact_lp.hpp"
 
 namespace wheelwright::bounds::exact_lp_test {
 namespace {

@@ -2,13 +2,12 @@
 // Guarantees against exact rationals, with zero tolerance.
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/minimax.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-
-#include "bounds/exact.hpp"
-#include "bounds/rows.hpp"
+#include "bounds/certificate.hpp"
+#include "bounds/feasible_set.hpp"
+#include "bounds/minimax.hpp"
+#include "bounds/slab_rows.hpp"
+#include "tests/bounds/exact.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::exact_test {
 namespace {

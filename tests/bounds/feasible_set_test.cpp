@@ -4,11 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/minimax.hpp>
-
-#include "bounds/exact.hpp"
-#include "bounds/rows.hpp"
+#include "bounds/feasible_set.hpp"
+#include "bounds/minimax.hpp"
+#include "tests/bounds/exact.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::feasible_set_test {
 

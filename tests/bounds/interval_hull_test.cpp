@@ -5,13 +5,12 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/interval_hull.hpp>
-#include <wheelwright/bounds/minimax.hpp>
-#include <wheelwright/core/error.hpp>
-
-#include "bounds/rows.hpp"
+#include "bounds/certificate.hpp"
+#include "bounds/feasible_set.hpp"
+#include "bounds/interval_hull.hpp"
+#include "bounds/minimax.hpp"
+#include "core/error.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::interval_hull_test {
 namespace {

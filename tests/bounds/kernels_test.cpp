@@ -8,9 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/kernels.hpp>
-
-#include "bounds/rows.hpp"
+#include "bounds/kernels.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::kernels {
 namespace {

@@ -2,10 +2,9 @@
 // Laws of a set of parameters, for every kind of set.
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-
-#include "bounds/parameter_set.hpp"
-#include "bounds/rows.hpp"
+#include "bounds/feasible_set.hpp"
+#include "tests/bounds/parameter_set.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::laws_test {
 namespace {

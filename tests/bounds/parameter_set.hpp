@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
+#include "bounds/box.hpp"
 
 namespace wheelwright::bounds {
 

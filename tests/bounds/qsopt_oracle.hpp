@@ -17,8 +17,8 @@ extern "C" {
 #include <qsopt_ex/QSopt_ex.h>
 }
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "bounds/box.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::bounds::qsopt {
 

@@ -10,16 +10,15 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/interval_hull.hpp>
-#include <wheelwright/bounds/polytope.hpp>
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/bounds/support_table.hpp>
-#include <wheelwright/bounds/support_walk.hpp>
-
-#include "bounds/exact.hpp"
-#include "bounds/rows.hpp"
+#include "bounds/certificate.hpp"
+#include "bounds/feasible_set.hpp"
+#include "bounds/interval_hull.hpp"
+#include "bounds/polytope.hpp"
+#include "bounds/slab_rows.hpp"
+#include "bounds/support_table.hpp"
+#include "bounds/support_walk.hpp"
+#include "tests/bounds/exact.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::rounding_test {
 namespace {

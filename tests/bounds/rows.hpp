@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include <wheelwright/bounds/box.hpp>
-#include <wheelwright/core/regression.hpp>
+#include "bounds/box.hpp"
+#include "core/regression.hpp"
 
 namespace wheelwright::bounds::testing_rows {
 

@@ -6,11 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/support_table.hpp>
-#include <wheelwright/core/error.hpp>
-
-#include "bounds/exact.hpp"
-#include "bounds/rows.hpp"
+#include "bounds/support_table.hpp"
+#include "core/error.hpp"
+#include "tests/bounds/exact.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::support_table_test {
 namespace {

@@ -5,12 +5,11 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/bounds/support_walk.hpp>
-#include <wheelwright/core/error.hpp>
-
-#include "bounds/exact.hpp"
-#include "bounds/rows.hpp"
+#include "bounds/feasible_set.hpp"
+#include "bounds/support_walk.hpp"
+#include "core/error.hpp"
+#include "tests/bounds/exact.hpp"
+#include "tests/bounds/rows.hpp"
 
 namespace wheelwright::bounds::support_walk_test {
 namespace {

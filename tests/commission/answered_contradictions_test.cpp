@@ -10,10 +10,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/contradictions.hpp>
-
-#include "support/drives.hpp"
+#include "commission/commission.hpp"
+#include "commission/contradictions.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::answered_contradictions_test {
 

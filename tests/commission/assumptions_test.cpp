@@ -6,11 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/assumptions.hpp>
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/files/bytes.hpp>
-
-#include "support/drives.hpp"
+#include "commission/assumptions.hpp"
+#include "commission/commission.hpp"
+#include "files/bytes.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::assumptions_test {
 

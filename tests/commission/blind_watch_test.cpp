@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A stream that brings no decisions is told once when it has lasted too long, and once when it is over.
-#include <wheelwright/commission/blind_watch.hpp>
+#include "commission/blind_watch.hpp"
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::commission::blind_watch_test {
 namespace {

@@ -5,11 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/certificate.hpp>
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/error.hpp>
-
-#include "support/drives.hpp"
+#include "bounds/certificate.hpp"
+#include "commission/commission.hpp"
+#include "core/error.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::contradiction_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/detector_choice.hpp>
+#include "commission/detector_choice.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "detector/detectability.hpp"
-#include "support/drives.hpp"
+#include "core/error.hpp"
+#include "tests/detector/detectability.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::detector_choice_test {
 namespace {

@@ -2,10 +2,9 @@
 // Commissioning of a robot whose file carries what its simulator has beyond the basic model.
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/error.hpp>
-
-#include "support/drives.hpp"
+#include "commission/commission.hpp"
+#include "core/error.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::effects_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/commission/filter_choice.hpp>
+#include "commission/filter_choice.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,11 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/identify/estimate.hpp>
-
-#include "support/drives.hpp"
-#include "support/random.hpp"
+#include "core/error.hpp"
+#include "filter/row_stream.hpp"
+#include "identify/estimate.hpp"
+#include "tests/support/drives.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::commission::filter_choice_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kinematic residual from log to decision, on simulated drives whose truth is known.
-#include <wheelwright/commission/kinematic.hpp>
+#include "commission/kinematic.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-
-#include "support/kinematic_drives.hpp"
+#include "commission/commission.hpp"
+#include "commission/detector_walk.hpp"
+#include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::commission::kinematic_test {
 namespace {

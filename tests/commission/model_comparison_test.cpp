@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two sets of parameters against each other: closed forms on boxes and strips, and on random sets about a known truth
 // nothing true is ever refused.
-#include <wheelwright/commission/model_comparison.hpp>
+#include "commission/model_comparison.hpp"
 
 #include <cmath>
 #include <random>

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/noise_budget.hpp>
-
-#include "support/drives.hpp"
+#include "commission/commission.hpp"
+#include "commission/noise_budget.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kinematic residual at a stated risk from log to thresholds, on a robot that rolls in closed form.
-#include <wheelwright/commission/pose_at_risk.hpp>
+#include "commission/pose_at_risk.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,15 +10,14 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/kinematic.hpp>
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/commission/risk_watch.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/pose_margins.hpp>
-#include <wheelwright/model/model.hpp>
-
-#include "support/kinematic_drives.hpp"
-#include "support/known_unicycle.hpp"
+#include "commission/kinematic.hpp"
+#include "commission/margin_survey.hpp"
+#include "commission/risk_watch.hpp"
+#include "core/limits.hpp"
+#include "detector/pose_margins.hpp"
+#include "model/model.hpp"
+#include "tests/support/kinematic_drives.hpp"
+#include "tests/support/known_unicycle.hpp"
 
 namespace wheelwright::commission::pose_at_risk_test {
 namespace {

@@ -4,10 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-
-#include "support/drives.hpp"
+#include "commission/commission.hpp"
+#include "identify/least_squares.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::recovery_test {
 namespace {

@@ -2,7 +2,7 @@
 // The set and the detector at a stated risk, on an axis solved in closed form under the worst laws of errors that the
 // assumptions allow. Risks are large here, so that a few hundred runs would show a promise that is broken; the campaign
 // (SlowAtRisk) has the runs that the promise is stated for.
-#include <wheelwright/commission/at_risk.hpp>
+#include "commission/at_risk.hpp"
 
 #include <cmath>
 #include <iostream>
@@ -12,11 +12,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/detector/scale_detector.hpp>
-
-#include "support/exact_axis.hpp"
-#include "support/most_failures.hpp"
-#include "support/named_axes.hpp"
+#include "detector/scale_detector.hpp"
+#include "tests/support/exact_axis.hpp"
+#include "tests/support/most_failures.hpp"
+#include "tests/support/named_axes.hpp"
 
 namespace wheelwright::commission::risk_set_test {
 namespace {

@@ -8,11 +8,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/at_risk.hpp>
-
-#include "support/exact_axis.hpp"
-#include "support/most_failures.hpp"
-#include "support/named_axes.hpp"
+#include "commission/at_risk.hpp"
+#include "tests/support/exact_axis.hpp"
+#include "tests/support/most_failures.hpp"
+#include "tests/support/named_axes.hpp"
 
 namespace wheelwright::commission::serial_correlation_test {
 namespace {

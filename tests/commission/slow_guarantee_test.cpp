@@ -5,9 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-
-#include "support/drives.hpp"
+#include "commission/commission.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::slow_guarantee_test {
 namespace {

@@ -6,10 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-
-#include "support/kinematic_drives.hpp"
+#include "commission/commission.hpp"
+#include "commission/detector_walk.hpp"
+#include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::commission::slow_kinematic_test {
 namespace {

@@ -8,15 +8,14 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/contradictions.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/inference/identification.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "support/skip.hpp"
+#include "commission/commission.hpp"
+#include "commission/contradictions.hpp"
+#include "commission/detector_walk.hpp"
+#include "core/error.hpp"
+#include "inference/identification.hpp"
+#include "logs/csv.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/support/skip.hpp"
 
 namespace wheelwright::commission::slow_recordings_test {
 namespace {

@@ -5,11 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/core/error.hpp>
-
-#include "support/drives.hpp"
+#include "commission/commission.hpp"
+#include "commission/detector_walk.hpp"
+#include "core/error.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::trace_test {
 namespace {

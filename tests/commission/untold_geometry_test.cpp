@@ -8,9 +8,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-
-#include "support/random.hpp"
+#include "commission/commission.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::commission::untold_geometry_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/for_all.hpp>
+#include "core/for_all.hpp"
 
 #include <atomic>
 #include <stdexcept>

@@ -6,11 +6,10 @@
 #include <gtest/gtest.h>
 #include <boost/multiprecision/cpp_int.hpp>
 
-#include <wheelwright/core/check.hpp>
-#include <wheelwright/core/interval.hpp>
-#include <wheelwright/core/limits.hpp>
-
-#include "support/random.hpp"
+#include "core/check.hpp"
+#include "core/interval.hpp"
+#include "core/limits.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::core::interval_test {
 namespace {

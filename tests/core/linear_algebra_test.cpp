@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/linear_algebra.hpp>
+#include "core/linear_algebra.hpp"
 
 namespace wheelwright::core {
 namespace {

@@ -6,8 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/log.hpp>
+#include "core/error.hpp"
+#include "core/log.hpp"
 
 namespace wheelwright::core::log_test {
 namespace {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/regression_source_laws.hpp"
+#include "tests/support/regression_source_laws.hpp"
 
 #include <cmath>
 
-#include <wheelwright/commission/validation.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-
-#include "support/drives.hpp"
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "commission/validation.hpp"
+#include "core/error.hpp"
+#include "filter/row_stream.hpp"
+#include "tests/support/drives.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::core::regression_test {
 namespace {

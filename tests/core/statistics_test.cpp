@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/statistics.hpp>
+#include "core/error.hpp"
+#include "core/statistics.hpp"
 
 namespace wheelwright::core {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/words.hpp>
+#include "core/words.hpp"
 
 namespace wheelwright::core {
 namespace {

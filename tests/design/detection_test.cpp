@@ -5,13 +5,12 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/design/detection.hpp>
-#include <wheelwright/detector/fault_rows.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "design/robots.hpp"
-#include "support/drives.hpp"
+#include "core/limits.hpp"
+#include "design/detection.hpp"
+#include "detector/fault_rows.hpp"
+#include "sim/simulation.hpp"
+#include "tests/design/robots.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::design::detection_test {
 namespace {

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is promised before the drive: closed forms, and that no noise within the bounds makes it wider.
-#include <wheelwright/design/plan.hpp>
+#include "design/plan.hpp"
 
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/interval_hull.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/design/manoeuvre.hpp>
-
-#include "design/robots.hpp"
+#include "bounds/interval_hull.hpp"
+#include "core/error.hpp"
+#include "design/manoeuvre.hpp"
+#include "tests/design/robots.hpp"
 
 namespace wheelwright::design::objective_test {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Promises at a stated risk: what a plan promises against what commissioning and the detector over scales make of a log
 // that was driven along it.
-#include <wheelwright/design/risk_promise.hpp>
+#include "design/risk_promise.hpp"
 
 #include <cmath>
 #include <cstdint>
@@ -9,13 +9,12 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/design/stages.hpp>
-#include <wheelwright/detector/scale_detector.hpp>
-#include <wheelwright/detector/sum_margins.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "design/robots.hpp"
+#include "core/limits.hpp"
+#include "design/stages.hpp"
+#include "detector/scale_detector.hpp"
+#include "detector/sum_margins.hpp"
+#include "sim/simulation.hpp"
+#include "tests/design/robots.hpp"
 
 namespace wheelwright::design::risk_promise_test {
 namespace {

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/design/stages.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "design/stages.hpp"
+#include "model/robot.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::testing_support {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Minima that are known, and that neither threads nor repetition change anything.
-#include <wheelwright/design/stages.hpp>
+#include "design/stages.hpp"
 
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::design::search_test {
 namespace {

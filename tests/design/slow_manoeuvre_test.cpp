@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // A designed manoeuvre against a figure eight: both are driven in simulation, with noise and with parameters that are
 // not the believed ones, and both logs are commissioned.
-#include <wheelwright/design/manoeuvre.hpp>
+#include "design/manoeuvre.hpp"
 
 #include <cmath>
 #include <cstdint>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/sim/simulation.hpp>
-
-#include "design/robots.hpp"
+#include "sim/simulation.hpp"
+#include "tests/design/robots.hpp"
 
 namespace wheelwright::design::slow_manoeuvre_test {
 namespace {

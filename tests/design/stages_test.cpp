@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every point of the cube is a manoeuvre within the limits that retraces its path.
-#include <wheelwright/design/stages.hpp>
+#include "design/stages.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "design/robots.hpp"
+#include "core/error.hpp"
+#include "tests/design/robots.hpp"
 
 namespace wheelwright::design::stages_test {
 namespace {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/allocations.hpp"
+#include "tests/support/allocations.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Core>
 
-#include <wheelwright/commission/commission.hpp>
-
-#include "support/drives.hpp"
-#include "support/kinematic_drives.hpp"
-#include "support/known_unicycle.hpp"
-#include "support/skip.hpp"
+#include "commission/commission.hpp"
+#include "tests/support/drives.hpp"
+#include "tests/support/kinematic_drives.hpp"
+#include "tests/support/known_unicycle.hpp"
+#include "tests/support/skip.hpp"
 
 namespace wheelwright::detector::allocation_test {
 namespace {

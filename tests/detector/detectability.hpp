@@ -11,10 +11,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/detector/margins.hpp>
-
-#include "support/drives.hpp"
-#include "support/random.hpp"
+#include "detector/margins.hpp"
+#include "tests/support/drives.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::testing_support {
 

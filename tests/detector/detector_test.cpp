@@ -14,11 +14,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/detector.hpp>
-
-#include "support/drives.hpp"
-#include "support/random.hpp"
+#include "core/error.hpp"
+#include "detector/detector.hpp"
+#include "tests/support/drives.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::detector::detector_test {
 namespace {

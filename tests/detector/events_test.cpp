@@ -6,11 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/detector.hpp>
-#include <wheelwright/detector/events.hpp>
-
-#include "support/random.hpp"
+#include "core/error.hpp"
+#include "detector/detector.hpp"
+#include "detector/events.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::detector::events_test {
 namespace {

@@ -7,10 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/fault_margin.hpp>
-
-#include "support/random.hpp"
+#include "core/limits.hpp"
+#include "detector/fault_margin.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::detector::fault_margin_test {
 namespace {

@@ -7,10 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/detector/fault_rows.hpp>
-
-#include "support/drives.hpp"
-#include "support/fault_oracle.hpp"
+#include "detector/fault_rows.hpp"
+#include "tests/support/drives.hpp"
+#include "tests/support/fault_oracle.hpp"
 
 namespace wheelwright::detector::fault_rows_test {
 

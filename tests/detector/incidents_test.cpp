@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/detector/incidents.hpp>
+#include "detector/incidents.hpp"
 
 namespace wheelwright::detector::incidents_test {
 namespace {

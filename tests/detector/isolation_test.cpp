@@ -8,10 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/detector/isolation.hpp>
-
-#include "detector/detectability.hpp"
+#include "commission/detector_walk.hpp"
+#include "detector/isolation.hpp"
+#include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::isolation_test {
 namespace {

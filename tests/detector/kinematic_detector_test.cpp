@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/detector.hpp>
+#include "detector/detector.hpp"
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-
-#include "support/kinematic_drives.hpp"
+#include "core/error.hpp"
+#include "filter/row_stream.hpp"
+#include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::detector::kinematic_detector_test {
 namespace {

@@ -5,10 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/margins.hpp>
-
-#include "detector/detectability.hpp"
+#include "core/limits.hpp"
+#include "detector/margins.hpp"
+#include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::margins_test {
 namespace {

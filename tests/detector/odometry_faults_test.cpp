@@ -6,14 +6,13 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/kinematic.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/margins.hpp>
-#include <wheelwright/detector/odometry_faults.hpp>
-
-#include "detector/detectability.hpp"
-#include "support/drives.hpp"
-#include "support/random.hpp"
+#include "commission/kinematic.hpp"
+#include "core/limits.hpp"
+#include "detector/margins.hpp"
+#include "detector/odometry_faults.hpp"
+#include "tests/detector/detectability.hpp"
+#include "tests/support/drives.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::detector::odometry_faults_test {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sizes that the sums of a pose are said to show, put into a robot that rolls in closed form, with other parameters of
 // the set and other errors than those of the log that was asked.
-#include <wheelwright/detector/pose_margins.hpp>
+#include "detector/pose_margins.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +11,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/model/model.hpp>
-
-#include "support/known_unicycle.hpp"
+#include "core/error.hpp"
+#include "model/model.hpp"
+#include "tests/support/known_unicycle.hpp"
 
 namespace wheelwright::detector::pose_margins_test {
 namespace {

@@ -2,7 +2,7 @@
 // Sums of what odometry leaves of a pose, on a robot that rolls in closed form, under the worst laws of errors that the
 // assumption allows. Risks are large here, so that a promise that is broken would show; SlowPoseSums has thousands of
 // runs.
-#include <wheelwright/detector/pose_sums.hpp>
+#include "detector/pose_sums.hpp"
 
 #include <cmath>
 #include <iostream>
@@ -11,10 +11,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "support/known_unicycle.hpp"
-#include "support/most_failures.hpp"
+#include "core/error.hpp"
+#include "tests/support/known_unicycle.hpp"
+#include "tests/support/most_failures.hpp"
 
 namespace wheelwright::detector::pose_sums_test {
 namespace {

@@ -4,9 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-
-#include "support/drives.hpp"
+#include "commission/commission.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::detector::radius_fault_test {
 namespace {

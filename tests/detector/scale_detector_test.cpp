@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/detector/scale_detector.hpp>
+#include "detector/scale_detector.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,9 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-
-#include "support/exact_axis.hpp"
+#include "commission/commission.hpp"
+#include "tests/support/exact_axis.hpp"
 
 namespace wheelwright::detector::scale_detector_test {
 namespace {

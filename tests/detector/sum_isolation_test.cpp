@@ -5,10 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/detector/sum_isolation.hpp>
-
-#include "detector/detectability.hpp"
+#include "commission/detector_walk.hpp"
+#include "detector/sum_isolation.hpp"
+#include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::sum_isolation_test {
 namespace {

@@ -10,9 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/detector/sum_margins.hpp>
-
-#include "detector/detectability.hpp"
+#include "detector/sum_margins.hpp"
+#include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::sum_response_test {
 namespace {

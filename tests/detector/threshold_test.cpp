@@ -7,11 +7,10 @@
 #include <gtest/gtest.h>
 #include <boost/multiprecision/cpp_int.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/detector/threshold.hpp>
-
-#include "support/random.hpp"
+#include "core/error.hpp"
+#include "core/limits.hpp"
+#include "detector/threshold.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::detector::threshold_test {
 namespace {

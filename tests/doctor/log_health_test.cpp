@@ -10,15 +10,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/doctor/log_health.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/results/health_json.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "support/drives.hpp"
-#include "support/kinematic_drives.hpp"
-#include "support/skip.hpp"
+#include "doctor/log_health.hpp"
+#include "logs/csv.hpp"
+#include "results/health_json.hpp"
+#include "robots/robot_file.hpp"
+#include "sim/simulation.hpp"
+#include "tests/support/drives.hpp"
+#include "tests/support/kinematic_drives.hpp"
+#include "tests/support/skip.hpp"
 
 namespace wheelwright::doctor::log_health_test {
 namespace {

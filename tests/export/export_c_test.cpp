@@ -6,17 +6,16 @@
 
 #include <Eigen/LU>
 
-#include <wheelwright/bounds/slab_rows.hpp>
-#include <wheelwright/export/export_c.hpp>
-#include <wheelwright/filter/motion_bound.hpp>
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/model/single_axis.hpp>
-
-#include "support/c_detector.hpp"
-#include "support/random.hpp"
-#include "support/scratch.hpp"
-#include "support/skip.hpp"
+#include "bounds/slab_rows.hpp"
+#include "export/export_c.hpp"
+#include "filter/motion_bound.hpp"
+#include "model/differential_drive.hpp"
+#include "model/robot.hpp"
+#include "model/single_axis.hpp"
+#include "tests/support/c_detector.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/scratch.hpp"
+#include "tests/support/skip.hpp"
 
 namespace wheelwright::exporter::export_c_test {
 

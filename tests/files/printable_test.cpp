@@ -6,8 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/files/json.hpp>
-#include <wheelwright/files/words.hpp>
+#include "files/json.hpp"
+#include "files/words.hpp"
 
 namespace wheelwright::files::printable_test {
 namespace {

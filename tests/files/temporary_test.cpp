@@ -13,11 +13,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/files/temporary.hpp>
-
-#include "support/scratch.hpp"
+#include "core/error.hpp"
+#include "files/bytes.hpp"
+#include "files/temporary.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::files::temporary_test {
 namespace {

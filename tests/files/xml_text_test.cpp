@@ -5,9 +5,9 @@
 #include <random>
 #include <string>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/files/place.hpp>
-#include <wheelwright/files/xml_text.hpp>
+#include "core/error.hpp"
+#include "files/place.hpp"
+#include "files/xml_text.hpp"
 
 namespace wheelwright::files::xml_text_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/files/bytes.hpp>
+#include "files/bytes.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/effort_correction.hpp>
+#include "core/error.hpp"
+#include "filter/effort_correction.hpp"
 
 namespace wheelwright::filter::effort_correction_test {
 namespace {

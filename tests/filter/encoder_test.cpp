@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/encoder.hpp>
-#include <wheelwright/filter/measurement.hpp>
+#include "filter/encoder.hpp"
+#include "filter/measurement.hpp"
 
 #include <cmath>
 #include <numbers>
@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "support/random.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::filter::encoder_test {
 namespace {

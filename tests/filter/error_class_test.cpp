@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/error_class.hpp>
+#include "filter/error_class.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::filter::error_class_test {
 namespace {

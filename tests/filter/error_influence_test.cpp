@@ -6,11 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/filter/noise.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-
-#include "support/drives.hpp"
+#include "core/log.hpp"
+#include "filter/noise.hpp"
+#include "filter/row_stream.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::filter::error_influence_test {
 namespace {

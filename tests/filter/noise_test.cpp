@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/noise.hpp>
+#include "filter/noise.hpp"
 
 #include <array>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/filter/regressor_filter.hpp>
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/single_axis.hpp>
+#include "filter/regressor_filter.hpp"
+#include "model/differential_drive.hpp"
+#include "model/single_axis.hpp"
 
 namespace wheelwright::filter::noise_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/odometry_filter.hpp>
+#include "filter/odometry_filter.hpp"
 
 #include <array>
 #include <cmath>
@@ -8,10 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-
-#include "support/random.hpp"
+#include "core/error.hpp"
+#include "filter/row_stream.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::filter::odometry_filter_test {
 namespace {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/filter/row_stream.hpp>
+#include "filter/row_stream.hpp"
 
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/single_axis.hpp>
+#include "core/error.hpp"
+#include "model/differential_drive.hpp"
+#include "model/single_axis.hpp"
 
 namespace wheelwright::filter::regressor_filter_test {
 namespace {

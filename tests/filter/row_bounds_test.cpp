@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rows against a plant that is solved exactly between the events of its efforts: |y − Yθ| <= dy + dY|θ|, every row.
-#include <wheelwright/filter/regressor_filter.hpp>
+#include "filter/regressor_filter.hpp"
 
 #include <cmath>
 #include <numbers>
@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/model/single_axis.hpp>
+#include "model/single_axis.hpp"
 
 namespace wheelwright::filter::row_bounds_test {
 namespace {

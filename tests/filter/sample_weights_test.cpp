@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Weights of single samples, against what a sum does when that sample is moved.
-#include <wheelwright/filter/sample_weights.hpp>
+#include "filter/sample_weights.hpp"
 
 #include <cmath>
 #include <map>
@@ -10,11 +10,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/filter/predictable_regressor.hpp>
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/single_axis.hpp>
-
-#include "support/random.hpp"
+#include "filter/predictable_regressor.hpp"
+#include "model/differential_drive.hpp"
+#include "model/single_axis.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::filter::sample_weights_test {
 namespace {

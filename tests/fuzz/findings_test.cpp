@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "fuzz/fuzzers.hpp"
+#include "tests/fuzz/fuzzers.hpp"
 
 namespace wheelwright::fuzz_test {
 namespace {

@@ -22,8 +22,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "fuzz/fuzzers.hpp"
-#include "fuzz/mutations.hpp"
+#include "tests/fuzz/fuzzers.hpp"
+#include "tests/fuzz/mutations.hpp"
 
 namespace wheelwright::fuzz_test {
 namespace {

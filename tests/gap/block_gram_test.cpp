@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: QR on the rows themselves, block by block.
-#include <wheelwright/gap/block_gram.hpp>
+#include "gap/block_gram.hpp"
 
 #include <cmath>
 #include <random>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/QR>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::gap::block_gram_test {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: inverse dynamics of prescribed smooth motions, written from the physics of each effect and not from the
 // catalogue's columns. With the true coefficient the column must take the residual away.
-#include <wheelwright/gap/effect.hpp>
+#include "gap/effect.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +12,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
+#include "core/error.hpp"
+#include "gap/drive.hpp"
+#include "gap/gap_rows.hpp"
 
 namespace wheelwright::gap::catalogue_test {
 namespace {

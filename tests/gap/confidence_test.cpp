@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/gap/confidence.hpp>
+#include "gap/confidence.hpp"
 
 namespace wheelwright::gap::confidence_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: columns of known angles.
-#include <wheelwright/gap/confusion.hpp>
+#include "gap/confusion.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +12,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/QR>
 
-#include <wheelwright/gap/further_drive.hpp>
-
-#include "gap/noisy_log.hpp"
+#include "gap/further_drive.hpp"
+#include "tests/gap/noisy_log.hpp"
 
 namespace wheelwright::gap::confusion_test {
 namespace {

@@ -4,12 +4,11 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/regimes.hpp>
-#include <wheelwright/model/robot.hpp>
-
-#include "gap/made_up_drive.hpp"
+#include "core/error.hpp"
+#include "gap/drive.hpp"
+#include "gap/regimes.hpp"
+#include "model/robot.hpp"
+#include "tests/gap/made_up_drive.hpp"
 
 namespace wheelwright::gap::contradictions_test {
 namespace {

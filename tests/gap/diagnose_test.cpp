@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/diagnose.hpp>
+#include "gap/diagnose.hpp"
 
 #include <algorithm>
 #include <map>
@@ -11,9 +11,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "gap/noisy_log.hpp"
+#include "core/error.hpp"
+#include "tests/gap/noisy_log.hpp"
 
 namespace wheelwright::gap::diagnose_test {
 namespace {

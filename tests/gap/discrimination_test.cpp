@@ -9,15 +9,14 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/design/stages.hpp>
-#include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/discrimination_design.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/further_drive.hpp>
-
-#include "design/robots.hpp"
+#include "core/error.hpp"
+#include "design/stages.hpp"
+#include "gap/block_gram.hpp"
+#include "gap/discrimination_design.hpp"
+#include "gap/drive.hpp"
+#include "gap/effect.hpp"
+#include "gap/further_drive.hpp"
+#include "tests/design/robots.hpp"
 
 namespace wheelwright::gap::discrimination_test {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracles: the convolution integral; RegressorFilter on the same log as the step goes to zero.
-#include <wheelwright/gap/drive.hpp>
+#include "gap/drive.hpp"
 
 #include <array>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/filter/regressor_filter.hpp>
+#include "filter/regressor_filter.hpp"
 
 namespace wheelwright::gap::drive_filter_test {
 namespace {

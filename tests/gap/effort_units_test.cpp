@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/effort_units.hpp>
+#include "gap/effort_units.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/diagnose.hpp>
-
-#include "gap/noisy_log.hpp"
+#include "core/error.hpp"
+#include "gap/diagnose.hpp"
+#include "tests/gap/noisy_log.hpp"
 
 namespace wheelwright::gap::effort_units_test {
 namespace {

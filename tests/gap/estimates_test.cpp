@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: the simulator's own numbers, and the axioms of Shapley's value.
-#include <wheelwright/gap/estimates.hpp>
+#include "gap/estimates.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "gap/noisy_log.hpp"
+#include "tests/gap/noisy_log.hpp"
 
 namespace wheelwright::gap::estimates_test {
 namespace {

@@ -7,11 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/improved_robot.hpp>
-#include <wheelwright/model/effect_law.hpp>
-
-#include "gap/simulated_gap.hpp"
+#include "core/error.hpp"
+#include "gap/improved_robot.hpp"
+#include "model/effect_law.hpp"
+#include "tests/gap/simulated_gap.hpp"
 
 namespace wheelwright::gap::improved_robot_test {
 

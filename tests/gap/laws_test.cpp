@@ -14,10 +14,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/words.hpp>
-#include <wheelwright/gap/diagnose.hpp>
-
-#include "gap/noisy_log.hpp"
+#include "core/words.hpp"
+#include "gap/diagnose.hpp"
+#include "tests/gap/noisy_log.hpp"
 
 namespace wheelwright::gap::laws_test {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <random>
 
-#include <wheelwright/gap/drive.hpp>
+#include "gap/drive.hpp"
 
 namespace wheelwright::gap::gap_example {
 

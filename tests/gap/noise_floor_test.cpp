@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: what noise does to the rows of the very same motion, simulated with and without it.
-#include <wheelwright/gap/noise_floor.hpp>
+#include "gap/noise_floor.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "gap/simulated_gap.hpp"
+#include "tests/gap/simulated_gap.hpp"
 
 namespace wheelwright::gap::noise_floor_test {
 namespace {

@@ -12,10 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/gap/selection.hpp>
-
-#include "gap/simulated_gap.hpp"
+#include "gap/prepared.hpp"
+#include "gap/selection.hpp"
+#include "tests/gap/simulated_gap.hpp"
 
 namespace wheelwright::gap::gap_example {
 

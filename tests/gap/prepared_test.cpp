@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/gap/prepared.hpp>
+#include "gap/prepared.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "gap/noisy_log.hpp"
+#include "core/error.hpp"
+#include "tests/gap/noisy_log.hpp"
 
 namespace wheelwright::gap::prepared_test {
 namespace {

@@ -9,11 +9,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "support/skip.hpp"
+#include "gap/diagnose.hpp"
+#include "logs/csv.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/support/skip.hpp"
 
 namespace wheelwright::gap::recordings_test {
 namespace {

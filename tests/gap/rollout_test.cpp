@@ -8,10 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/rollout.hpp>
-
-#include "gap/simulated_gap.hpp"
+#include "core/error.hpp"
+#include "gap/rollout.hpp"
+#include "tests/gap/simulated_gap.hpp"
 
 namespace wheelwright::gap::rollout_test {
 namespace {

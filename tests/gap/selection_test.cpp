@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: the simulator, which knows what it did.
-#include <wheelwright/gap/selection.hpp>
+#include "gap/selection.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -16,9 +16,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "gap/noisy_log.hpp"
+#include "core/error.hpp"
+#include "tests/gap/noisy_log.hpp"
 
 namespace wheelwright::gap::selection_test {
 namespace {

@@ -7,10 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/gap/improved_robot.hpp>
-#include <wheelwright/gap/shrink.hpp>
-
-#include "gap/simulated_gap.hpp"
+#include "gap/improved_robot.hpp"
+#include "gap/shrink.hpp"
+#include "tests/gap/simulated_gap.hpp"
 
 namespace wheelwright::gap::shrink_test {
 namespace {

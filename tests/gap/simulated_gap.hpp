@@ -7,12 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/gap/block_gram.hpp>
-#include <wheelwright/gap/effect.hpp>
-#include <wheelwright/gap/gap_rows.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "core/error.hpp"
+#include "filter/measurement.hpp"
+#include "gap/block_gram.hpp"
+#include "gap/effect.hpp"
+#include "gap/gap_rows.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::gap::gap_example {
 

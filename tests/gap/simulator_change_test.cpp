@@ -7,10 +7,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/simulator_change.hpp>
-
-#include "gap/simulated_gap.hpp"
+#include "core/error.hpp"
+#include "gap/simulator_change.hpp"
+#include "tests/gap/simulated_gap.hpp"
 
 namespace wheelwright::gap::simulator_change_test {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/where.hpp>
+#include "core/error.hpp"
+#include "gap/where.hpp"
 
 namespace wheelwright::gap::spectrum_test {
 namespace {

@@ -10,11 +10,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/drive.hpp>
-#include <wheelwright/gap/where.hpp>
-
-#include "gap/made_up_drive.hpp"
+#include "core/error.hpp"
+#include "gap/drive.hpp"
+#include "gap/where.hpp"
+#include "tests/gap/made_up_drive.hpp"
 
 namespace wheelwright::gap::where_test {
 namespace {

@@ -26,7 +26,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "judge.hpp"
+#include "tests/guarantee/judge.hpp"
 
 namespace wheelwright::guarantee {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "drive.hpp"
+#include "tests/guarantee/drive.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "dice.hpp"
+#include "tests/guarantee/dice.hpp"
 
 namespace wheelwright::guarantee {
 namespace {

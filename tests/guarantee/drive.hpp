@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "plant.hpp"
+#include "tests/guarantee/plant.hpp"
 
 namespace wheelwright::guarantee {
 

@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "guarantee/dice.hpp"
-#include "guarantee/judge.hpp"
+#include "tests/guarantee/dice.hpp"
+#include "tests/guarantee/judge.hpp"
 
 namespace wheelwright::guarantee_test {
 namespace {

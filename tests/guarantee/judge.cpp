@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "judge.hpp"
+#include "tests/guarantee/judge.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/commission/assumptions.hpp>
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
-#include <wheelwright/commission/margin_survey.hpp>
-#include <wheelwright/core/regression.hpp>
-#include <wheelwright/detector/isolation.hpp>
+#include "bounds/feasible_set.hpp"
+#include "commission/assumptions.hpp"
+#include "commission/commission.hpp"
+#include "commission/detector_walk.hpp"
+#include "commission/margin_survey.hpp"
+#include "core/regression.hpp"
+#include "detector/isolation.hpp"
 
 namespace wheelwright::guarantee {
 namespace {

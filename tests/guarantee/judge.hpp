@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <string>
 
-#include "scene.hpp"
+#include "tests/guarantee/scene.hpp"
 
 namespace wheelwright::guarantee {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plant.hpp"
+#include "tests/guarantee/plant.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "dice.hpp"
-#include "scene.hpp"
+#include "tests/guarantee/dice.hpp"
+#include "tests/guarantee/scene.hpp"
 
 namespace wheelwright::guarantee {
 namespace {

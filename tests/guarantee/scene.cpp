@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene.hpp"
+#include "tests/guarantee/scene.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
 
-#include "dice.hpp"
+#include "tests/guarantee/dice.hpp"
 
 namespace wheelwright::guarantee {
 namespace {

@@ -9,10 +9,9 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/model/robot.hpp>
-
-#include "drive.hpp"
+#include "core/log.hpp"
+#include "model/robot.hpp"
+#include "tests/guarantee/drive.hpp"
 
 namespace wheelwright::guarantee {
 

@@ -6,10 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/identify/moments.hpp>
-
-#include "support/random.hpp"
+#include "core/error.hpp"
+#include "identify/moments.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::identify::block_sums_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/noise_level.hpp>
+#include "identify/noise_level.hpp"
 
 #include <cmath>
 #include <functional>
@@ -7,9 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "support/random.hpp"
+#include "core/error.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::identify::difference_noise_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/estimate.hpp>
+#include "identify/estimate.hpp"
+#include "core/statistics.hpp"
 
 #include <cmath>
 
@@ -8,11 +8,10 @@
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "identify/least_squares.hpp"
+#include "identify/noise_level.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::identify::estimate_test {
 namespace {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/estimate.hpp>
+#include "core/statistics.hpp"
+#include "identify/estimate.hpp"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/identify/noise_level.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "identify/noise_level.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::identify::estimator_choice_test {
 namespace {

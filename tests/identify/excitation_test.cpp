@@ -2,10 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/identify/least_squares.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "identify/least_squares.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::identify::excitation_test {
 namespace {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/instruments.hpp>
+#include "identify/instruments.hpp"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/model/single_axis.hpp>
-
-#include "support/drives.hpp"
+#include "core/error.hpp"
+#include "filter/row_stream.hpp"
+#include "model/single_axis.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::identify::instruments_test {
 namespace {

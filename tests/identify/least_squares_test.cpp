@@ -5,11 +5,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/error.hpp"
+#include "identify/least_squares.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::identify::least_squares_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/minimise_scalar.hpp>
+#include "identify/minimise_scalar.hpp"
 
 #include <cmath>
 #include <limits>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::identify::minimise_scalar_test {
 namespace {

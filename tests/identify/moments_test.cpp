@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/identify/moments.hpp>
+#include "identify/moments.hpp"
 
 #include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/identify/gram_kernels.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/error.hpp"
+#include "identify/gram_kernels.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::identify::moments_test {
 namespace {

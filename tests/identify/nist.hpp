@@ -15,7 +15,7 @@
 #include <Eigen/Core>
 #include <Eigen/QR>
 
-#include <wheelwright/core/limits.hpp>
+#include "core/limits.hpp"
 
 namespace wheelwright::testing_support {
 

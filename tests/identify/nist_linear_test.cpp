@@ -3,10 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/identify/least_squares.hpp>
-
-#include "identify/nist.hpp"
-#include "support/rows.hpp"
+#include "identify/least_squares.hpp"
+#include "tests/identify/nist.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::identify::nist_linear_test {
 namespace {

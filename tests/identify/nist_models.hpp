@@ -12,9 +12,8 @@
 
 #include <ceres/jet.h>
 
-#include <wheelwright/identify/variable_projection.hpp>
-
-#include "identify/nist.hpp"
+#include "identify/variable_projection.hpp"
+#include "tests/identify/nist.hpp"
 
 namespace wheelwright::testing_support {
 

@@ -3,9 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/identify/variable_projection.hpp>
-
-#include "identify/nist_models.hpp"
+#include "identify/variable_projection.hpp"
+#include "tests/identify/nist_models.hpp"
 
 namespace wheelwright::identify::nist_nonlinear_test {
 namespace {

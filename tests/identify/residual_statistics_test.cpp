@@ -4,12 +4,11 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/statistics.hpp"
+#include "identify/least_squares.hpp"
+#include "identify/noise_level.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::identify::residual_statistics_test {
 namespace {

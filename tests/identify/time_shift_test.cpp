@@ -6,13 +6,12 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/identify/time_shift.hpp>
-#include <wheelwright/inference/identification.hpp>
-
-#include "support/drives.hpp"
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/error.hpp"
+#include "identify/time_shift.hpp"
+#include "inference/identification.hpp"
+#include "tests/support/drives.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::identify::time_shift_test {
 namespace {

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/block_bootstrap.hpp>
+#include "inference/block_bootstrap.hpp"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 #include <Eigen/LU>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/error.hpp"
+#include "identify/noise_level.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::inference::block_bootstrap_test {
 namespace {

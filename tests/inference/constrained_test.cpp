@@ -8,11 +8,10 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/inference/constrained.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/error.hpp"
+#include "inference/constrained.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::inference::constrained_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/noise_levels.hpp>
+#include "inference/noise_levels.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "support/random.hpp"
+#include "core/error.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::inference::error_bound_test {
 namespace {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/identifiability.hpp>
+#include "inference/identifiability.hpp"
 
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/error.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::inference::identifiability_test {
 namespace {

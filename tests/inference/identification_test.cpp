@@ -9,10 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/inference/identification.hpp>
-#include <wheelwright/words/identification_words.hpp>
-
-#include "support/drives.hpp"
+#include "inference/identification.hpp"
+#include "tests/support/drives.hpp"
+#include "words/identification_words.hpp"
 
 namespace wheelwright::inference::identification_test {
 

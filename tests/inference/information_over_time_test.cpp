@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/inference/identifiability.hpp>
+#include "inference/identifiability.hpp"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 #include <Eigen/LU>
 
-#include <wheelwright/core/error.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/error.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::inference::information_over_time_test {
 namespace {

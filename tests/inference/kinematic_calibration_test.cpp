@@ -6,12 +6,11 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/inference/kinematic_calibration.hpp>
-#include <wheelwright/logs/csv.hpp>
-
-#include "support/random.hpp"
-#include "support/skip.hpp"
+#include "core/error.hpp"
+#include "inference/kinematic_calibration.hpp"
+#include "logs/csv.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/skip.hpp"
 
 namespace wheelwright::inference::kinematic_calibration_test {
 namespace {

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/inference/regions.hpp>
+#include "inference/regions.hpp"
+#include "core/statistics.hpp"
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/identify/noise_level.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "identify/noise_level.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::inference::regions_test {
 namespace {

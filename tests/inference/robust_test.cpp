@@ -9,12 +9,11 @@
 #include <Eigen/QR>
 #include <boost/math/distributions/students_t.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/inference/constrained.hpp>
-#include <wheelwright/inference/robust.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/error.hpp"
+#include "inference/constrained.hpp"
+#include "inference/robust.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::inference::robust_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/core/statistics.hpp>
-#include <wheelwright/inference/regions.hpp>
+#include "core/statistics.hpp"
+#include "inference/regions.hpp"
 
 #include <cmath>
 #include <functional>
@@ -9,11 +9,10 @@
 #include <gtest/gtest.h>
 #include <Eigen/LU>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/identify/noise_level.hpp>
-
-#include "support/random.hpp"
-#include "support/rows.hpp"
+#include "core/error.hpp"
+#include "identify/noise_level.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/rows.hpp"
 
 namespace wheelwright::inference::sign_perturbed_sums_test {
 

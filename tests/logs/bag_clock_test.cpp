@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/logs/bag_log.hpp>
+#include "logs/bag_log.hpp"
 
 namespace wheelwright::logs::bag_clock_test {
 namespace {

@@ -7,8 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/bag_log.hpp>
+#include "core/error.hpp"
+#include "logs/bag_log.hpp"
 
 namespace wheelwright::logs::bag_columns_test {
 namespace {

@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "logs/bag_samples.hpp"
-#include "support/scratch.hpp"
-
-#include <wheelwright/logs/ros_messages.hpp>
+#include "logs/ros_messages.hpp"
+#include "tests/logs/bag_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::bag_fuzz_test {
 namespace {

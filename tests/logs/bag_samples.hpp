@@ -12,9 +12,8 @@
 #include <sqlite3.h>
 #include <zstd.h>
 
-#include "logs/ros_cdr.hpp"
-
-#include <wheelwright/logs/bag.hpp>
+#include "logs/bag.hpp"
+#include "tests/logs/ros_cdr.hpp"
 
 namespace wheelwright::testing {
 

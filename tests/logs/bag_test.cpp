@@ -5,14 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "logs/bag_samples.hpp"
-#include "support/scratch.hpp"
-
-#include <wheelwright/files/bytes.hpp>
-#include <wheelwright/logs/bag.hpp>
-#include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/mcap.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
+#include "files/bytes.hpp"
+#include "logs/bag.hpp"
+#include "logs/bag_write.hpp"
+#include "logs/mcap.hpp"
+#include "logs/ros_messages.hpp"
+#include "tests/logs/bag_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::bag_test {
 namespace {

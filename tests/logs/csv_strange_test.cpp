@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tables that are not what they look like: other units, clocks and headers. What is not read is said.
-#include <wheelwright/logs/csv.hpp>
+#include "logs/csv.hpp"
 
 #include <cmath>
 #include <functional>
@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "support/scratch.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::csv_strange_test {
 namespace {

@@ -6,9 +6,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/logs/csv.hpp>
-
-#include "support/scratch.hpp"
+#include "logs/csv.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::csv_streams_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/csv.hpp>
+#include "logs/csv.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "support/scratch.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::csv_test {
 namespace {

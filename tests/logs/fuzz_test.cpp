@@ -6,10 +6,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "support/scratch.hpp"
+#include "logs/csv.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::fuzz_test {
 namespace {

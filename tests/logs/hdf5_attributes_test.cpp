@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What attributes, dimensions and places of datasets say of the columns of an HDF5 log.
-#include <wheelwright/logs/hdf5_log.hpp>
+#include "logs/hdf5_log.hpp"
 
 #include <cmath>
 #include <functional>
@@ -11,11 +11,10 @@
 #include <fmt/format.h>
 #include <hdf5.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-
-#include "support/scratch.hpp"
+#include "core/error.hpp"
+#include "logs/log_file.hpp"
+#include "logs/recorded_log.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::hdf5_attributes_test {
 namespace {

@@ -16,14 +16,13 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-#include "logs/bag_samples.hpp"
-#include "support/scratch.hpp"
-
-#include <wheelwright/logs/bag_log.hpp>
-#include <wheelwright/logs/database.hpp>
-#include <wheelwright/logs/hdf5_log.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/mcap_format.hpp>
+#include "logs/bag_log.hpp"
+#include "logs/database.hpp"
+#include "logs/hdf5_log.hpp"
+#include "logs/log_file.hpp"
+#include "logs/mcap_format.hpp"
+#include "tests/logs/bag_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::limits_test {
 namespace {

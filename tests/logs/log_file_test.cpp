@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "logs/log_file.hpp"
+#include "robots/robot_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,16 +13,16 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/logs/hdf5_log.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
-#include <wheelwright/logs/row_log.hpp>
+#include "core/error.hpp"
+#include "logs/bag_write.hpp"
+#include "logs/csv.hpp"
+#include "logs/hdf5_log.hpp"
+#include "logs/ros_messages.hpp"
+#include "logs/row_log.hpp"
 
 #include <hdf5.h>
 
-#include "support/scratch.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::log_file_test {
 namespace {

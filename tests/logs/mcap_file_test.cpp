@@ -6,10 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/files/bytes.hpp>
-
-#include "logs/mcap_samples.hpp"
-#include "support/scratch.hpp"
+#include "files/bytes.hpp"
+#include "tests/logs/mcap_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::mcap_file_test {
 namespace {

@@ -3,8 +3,8 @@
 #include <random>
 #include <string>
 
-#include "logs/mcap_samples.hpp"
-#include "support/scratch.hpp"
+#include "tests/logs/mcap_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::mcap_fuzz_test {
 namespace {

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/logs/mcap.hpp>
+#include "logs/mcap.hpp"
 
 namespace wheelwright::testing {
 

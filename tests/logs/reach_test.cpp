@@ -10,11 +10,10 @@
 #include <hdf5.h>
 #include <sqlite3.h>
 
-#include "logs/bag_samples.hpp"
-#include "support/scratch.hpp"
-
-#include <wheelwright/logs/database.hpp>
-#include <wheelwright/logs/log_file.hpp>
+#include "logs/database.hpp"
+#include "logs/log_file.hpp"
+#include "tests/logs/bag_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::reach_test {
 namespace {

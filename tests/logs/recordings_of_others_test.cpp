@@ -9,15 +9,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/bag_log.hpp>
-#include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/log_file.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
-#include <wheelwright/logs/row_log.hpp>
-
-#include "logs/ros_cdr.hpp"
-#include "support/scratch.hpp"
+#include "core/error.hpp"
+#include "logs/bag_log.hpp"
+#include "logs/bag_write.hpp"
+#include "logs/log_file.hpp"
+#include "logs/ros_messages.hpp"
+#include "logs/row_log.hpp"
+#include "tests/logs/ros_cdr.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::recordings_of_others_test {
 namespace {

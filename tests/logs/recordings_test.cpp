@@ -7,10 +7,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/logs/csv.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "support/skip.hpp"
+#include "logs/csv.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/support/skip.hpp"
 
 namespace wheelwright::logs::recordings_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/allocations.hpp"
+#include "tests/support/allocations.hpp"
 
 #include <array>
 #include <string>
@@ -7,9 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "logs/ros_cdr.hpp"
-
-#include <wheelwright/logs/ros_messages.hpp>
+#include "logs/ros_messages.hpp"
+#include "tests/logs/ros_cdr.hpp"
 
 namespace wheelwright::logs::ros_allocation_test {
 namespace {

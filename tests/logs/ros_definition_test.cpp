@@ -3,9 +3,8 @@
 #include <random>
 #include <string>
 
-#include "support/scratch.hpp"
-
-#include <wheelwright/logs/ros_messages.hpp>
+#include "logs/ros_messages.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::ros_definition_test {
 namespace {

@@ -8,11 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "logs/ros_cdr.hpp"
-#include "support/scratch.hpp"
-
-#include <wheelwright/logs/bag_write.hpp>
-#include <wheelwright/logs/ros_messages.hpp>
+#include "logs/bag_write.hpp"
+#include "logs/ros_messages.hpp"
+#include "tests/logs/ros_cdr.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::ros_extractor_test {
 namespace {

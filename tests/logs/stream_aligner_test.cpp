@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/row_log.hpp>
+#include "core/error.hpp"
+#include "logs/row_log.hpp"
 
 namespace wheelwright::logs::stream_aligner_test {
 namespace {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Commands as a recording: byte for byte what CDR laid down by hand says.
-#include <wheelwright/logs/velocity_commands.hpp>
+#include "logs/velocity_commands.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/logs/mcap.hpp>
-
-#include "logs/ros_cdr.hpp"
-#include "support/scratch.hpp"
+#include "core/error.hpp"
+#include "logs/mcap.hpp"
+#include "tests/logs/ros_cdr.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::velocity_commands_test {
 namespace {

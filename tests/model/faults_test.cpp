@@ -9,10 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/model/faults.hpp>
-
-#include "support/fault_oracle.hpp"
+#include "core/error.hpp"
+#include "model/faults.hpp"
+#include "tests/support/fault_oracle.hpp"
 
 namespace wheelwright::model::faults_test {
 namespace {

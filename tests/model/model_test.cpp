@@ -8,12 +8,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/robot.hpp>
-#include <wheelwright/model/single_axis.hpp>
-
-#include "support/fault_oracle.hpp"
+#include "core/error.hpp"
+#include "model/differential_drive.hpp"
+#include "model/robot.hpp"
+#include "model/single_axis.hpp"
+#include "tests/support/fault_oracle.hpp"
 
 namespace wheelwright::model::model_test {
 namespace {

@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/reality/case.hpp>
+#include "core/error.hpp"
+#include "reality/case.hpp"
 
 namespace wheelwright::reality::laws_test {
 namespace {

@@ -10,18 +10,17 @@
 #include <mujoco/mujoco.h>
 #include <Eigen/Core>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/gap/prepared.hpp>
-#include <wheelwright/gap/simulator_change.hpp>
-#include <wheelwright/reality/case.hpp>
-#include <wheelwright/reality/replay.hpp>
-#include <wheelwright/reality/signals.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/simulator_file.hpp>
-
-#include "robots/simulator_samples.hpp"
-#include "support/scratch.hpp"
+#include "core/error.hpp"
+#include "gap/diagnose.hpp"
+#include "gap/prepared.hpp"
+#include "gap/simulator_change.hpp"
+#include "reality/case.hpp"
+#include "reality/replay.hpp"
+#include "reality/signals.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/simulator_file.hpp"
+#include "tests/robots/simulator_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::reality::simulator_loop_test {
 namespace {

@@ -8,11 +8,10 @@
 #include <mujoco/mujoco.h>
 #include <Eigen/Core>
 
-#include <wheelwright/robots/robot_description.hpp>
-#include <wheelwright/robots/robot_origin.hpp>
-
-#include "robots/robot_samples.hpp"
-#include "support/scratch.hpp"
+#include "robots/robot_description.hpp"
+#include "robots/robot_origin.hpp"
+#include "tests/robots/robot_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::reality::urdf_test {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/reality/case.hpp>
+#include "core/error.hpp"
+#include "reality/case.hpp"
 
 namespace {
 

@@ -11,14 +11,13 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/detect_report.hpp>
-#include <wheelwright/report/gap_report.hpp>
-#include <wheelwright/report/health_report.hpp>
-
-#include "report/example.hpp"
-#include "report/gap_example.hpp"
-#include "support/skip.hpp"
+#include "report/commission_report.hpp"
+#include "report/detect_report.hpp"
+#include "report/gap_report.hpp"
+#include "report/health_report.hpp"
+#include "tests/report/example.hpp"
+#include "tests/report/gap_example.hpp"
+#include "tests/support/skip.hpp"
 
 namespace wheelwright::report::browser_test {
 namespace {

@@ -10,9 +10,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/report/page.hpp>
+#include "commission/commission.hpp"
+#include "model/differential_drive.hpp"
+#include "report/page.hpp"
 
 namespace wheelwright::report::report_example {
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page of a fleet: small, escaped, and there for any fleet.
-#include <wheelwright/report/fleet_report.hpp>
+#include "report/fleet_report.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "study/fleets.hpp"
+#include "tests/study/fleets.hpp"
 
 namespace wheelwright::report::fleet_report_test {
 namespace {

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/gap/diagnosis.hpp>
+#include "gap/diagnosis.hpp"
 
 namespace wheelwright::report::gap_example {
 

@@ -4,11 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/gap_report.hpp>
-#include <wheelwright/words/gap_words.hpp>
-
-#include "report/example.hpp"
-#include "report/gap_example.hpp"
+#include "report/gap_report.hpp"
+#include "tests/report/example.hpp"
+#include "tests/report/gap_example.hpp"
+#include "words/gap_words.hpp"
 
 namespace wheelwright::report::gap_report_test {
 using namespace words;

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/page.hpp>
+#include "report/page.hpp"
 
 namespace wheelwright::report {
 namespace {

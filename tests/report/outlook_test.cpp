@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The first screen of a detector's page: size over time to detection, a line for each guarantee, and what each is
 // worth.
-#include <wheelwright/report/outlook.hpp>
+#include "report/outlook.hpp"
 
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/words/commission_words.hpp>
-#include <wheelwright/words/text.hpp>
-
-#include "support/drives.hpp"
+#include "report/commission_report.hpp"
+#include "tests/support/drives.hpp"
+#include "words/commission_words.hpp"
+#include "words/text.hpp"
 
 namespace wheelwright::report::outlook_test {
 namespace {

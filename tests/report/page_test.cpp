@@ -11,18 +11,17 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/design_report.hpp>
-#include <wheelwright/report/detect_report.hpp>
-#include <wheelwright/report/gap_report.hpp>
-#include <wheelwright/report/identify_report.hpp>
-#include <wheelwright/report/page.hpp>
-#include <wheelwright/report/signals.hpp>
-#include <wheelwright/words/identification_words.hpp>
-
-#include "report/example.hpp"
-#include "report/gap_example.hpp"
-#include "support/drives.hpp"
+#include "report/commission_report.hpp"
+#include "report/design_report.hpp"
+#include "report/detect_report.hpp"
+#include "report/gap_report.hpp"
+#include "report/identify_report.hpp"
+#include "report/page.hpp"
+#include "report/signals.hpp"
+#include "tests/report/example.hpp"
+#include "tests/report/gap_example.hpp"
+#include "tests/support/drives.hpp"
+#include "words/identification_words.hpp"
 
 namespace wheelwright::report::page_test {
 using namespace words;

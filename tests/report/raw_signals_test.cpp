@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/signals.hpp>
+#include "report/signals.hpp"
 
 namespace wheelwright::report::raw_signals_test {
 namespace {

@@ -8,9 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/report/sensitivity_report.hpp>
+#include "core/error.hpp"
+#include "core/limits.hpp"
+#include "report/sensitivity_report.hpp"
 
 namespace wheelwright::report::sensitivity_drawings_test {
 

@@ -8,10 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/drawing.hpp>
-
-#include "report/example.hpp"
+#include "report/commission_report.hpp"
+#include "report/drawing.hpp"
+#include "tests/report/example.hpp"
 
 namespace wheelwright::report::set_drawings_test {
 namespace {

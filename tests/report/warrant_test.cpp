@@ -7,11 +7,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/detect_report.hpp>
-#include <wheelwright/report/sections.hpp>
-
-#include "report/example.hpp"
+#include "report/commission_report.hpp"
+#include "report/detect_report.hpp"
+#include "report/sections.hpp"
+#include "tests/report/example.hpp"
 
 namespace wheelwright::report::warrant_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Records of robots come back as they were, to the last bit.
-#include <wheelwright/results/fleet_json.hpp>
+#include "results/fleet_json.hpp"
 
 #include <cmath>
 #include <limits>
@@ -8,10 +8,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "study/fleets.hpp"
-#include "support/scratch.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/study/fleets.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::results::fleet_json_test {
 namespace {

@@ -10,11 +10,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/results/gap_json.hpp>
-
-#include "gap/simulated_gap.hpp"
-#include "report/gap_example.hpp"
-#include "support/scratch.hpp"
+#include "results/gap_json.hpp"
+#include "tests/gap/simulated_gap.hpp"
+#include "tests/report/gap_example.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::results::gap_json_test {
 namespace {

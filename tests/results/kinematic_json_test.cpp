@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kinematic section of model.json gives back the detector that was commissioned, bit for bit.
-#include <wheelwright/results/model_json.hpp>
+#include "results/model_json.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/detector/pose_sums.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "support/kinematic_drives.hpp"
+#include "core/error.hpp"
+#include "detector/pose_sums.hpp"
+#include "results/model_file.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::results::kinematic_json_test {
 namespace {

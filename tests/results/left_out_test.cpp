@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parameters of which a log shows noise alone are left out of the proof, and the model says so.
-#include <wheelwright/results/model_check.hpp>
+#include "results/model_check.hpp"
 
 #include <cmath>
 #include <numbers>
@@ -9,10 +9,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/results/model_json.hpp>
-
-#include "support/random.hpp"
+#include "commission/commission.hpp"
+#include "results/model_json.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::results::left_out_test {
 namespace {

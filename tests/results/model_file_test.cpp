@@ -8,11 +8,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "support/scratch.hpp"
+#include "results/model_file.hpp"
+#include "results/scenario_file.hpp"
+#include "sim/simulation.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::results::model_file_test {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/result_store.hpp>
+#include "results/result_store.hpp"
 
 #include <csignal>
 #include <cstdlib>
@@ -15,7 +15,7 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
-#include "support/scratch.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::results::result_store_test {
 namespace {

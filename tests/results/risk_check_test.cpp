@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a model says at a stated risk is proved from its log; what is sharper than the log makes it is found and named.
-#include <wheelwright/results/model_check.hpp>
+#include "results/model_check.hpp"
 
 #include <cmath>
 #include <functional>
@@ -10,9 +10,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "support/exact_axis.hpp"
-#include "support/named_axes.hpp"
-#include "support/scratch.hpp"
+#include "tests/support/exact_axis.hpp"
+#include "tests/support/named_axes.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::results::risk_check_test {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/results/study_json.hpp>
+#include "results/study_json.hpp"
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::results::study_file_test {
 namespace {

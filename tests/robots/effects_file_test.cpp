@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/model/effect_law.hpp>
-#include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/robots/robot_file.hpp>
+#include "core/error.hpp"
+#include "model/effect_law.hpp"
+#include "results/scenario_file.hpp"
+#include "robots/robot_file.hpp"
 
 namespace wheelwright::robots::effects_file_test {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lists and directories of robots: roles, dates, order, and what is wrong with them.
-#include <wheelwright/robots/fleet_list.hpp>
+#include "robots/fleet_list.hpp"
 
 #include <gtest/gtest.h>
 
-#include "support/scratch.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::robots::fleet_list_test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/robots/robot_file.hpp>
+#include "robots/robot_file.hpp"
 
 #include <string>
 #include <vector>
@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "support/scratch.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::robots::robot_file_test {
 namespace {

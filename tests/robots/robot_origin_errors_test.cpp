@@ -6,13 +6,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/robots/controller_file.hpp>
-#include <wheelwright/robots/robot_description.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-#include <wheelwright/robots/robot_origin.hpp>
-
-#include "robots/robot_samples.hpp"
-#include "support/scratch.hpp"
+#include "robots/controller_file.hpp"
+#include "robots/robot_description.hpp"
+#include "robots/robot_file.hpp"
+#include "robots/robot_origin.hpp"
+#include "tests/robots/robot_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::robots::robot_origin_errors_test {
 namespace {

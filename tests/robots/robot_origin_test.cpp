@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Robot files from URDF and controllers: closed forms, frames that stand anyhow, and the way back through the
 // reader.
-#include <wheelwright/robots/robot_origin.hpp>
+#include "robots/robot_origin.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/robots/controller_file.hpp>
-#include <wheelwright/robots/robot_description.hpp>
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "robots/robot_samples.hpp"
-#include "support/scratch.hpp"
+#include "robots/controller_file.hpp"
+#include "robots/robot_description.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/robots/robot_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::robots::robot_origin_test {
 namespace {

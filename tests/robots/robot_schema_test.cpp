@@ -6,9 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include <wheelwright/robots/robot_file.hpp>
-
-#include "support/scratch.hpp"
+#include "robots/robot_file.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::robots::robot_schema_test {
 namespace {

@@ -9,15 +9,14 @@
 #include <random>
 #include <string>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/robots/robot_description.hpp>
-#include <wheelwright/robots/simulator_document.hpp>
-#include <wheelwright/robots/simulator_file.hpp>
-#include <wheelwright/robots/wheel_geometry.hpp>
-
-#include "robots/robot_samples.hpp"
-#include "robots/simulator_samples.hpp"
-#include "support/scratch.hpp"
+#include "core/error.hpp"
+#include "robots/robot_description.hpp"
+#include "robots/simulator_document.hpp"
+#include "robots/simulator_file.hpp"
+#include "robots/wheel_geometry.hpp"
+#include "tests/robots/robot_samples.hpp"
+#include "tests/robots/simulator_samples.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::robots::simulator_file_test {
 namespace {

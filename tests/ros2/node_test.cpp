@@ -14,15 +14,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/logs/recorded_log.hpp>
-#include <wheelwright/results/model_file.hpp>
-#include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/robots/online_model_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "../../examples/ros2/src/node.hpp"
-#include "support/scratch.hpp"
+#include "commission/commission.hpp"
+#include "examples/ros2/src/node.hpp"
+#include "logs/recorded_log.hpp"
+#include "results/model_file.hpp"
+#include "results/scenario_file.hpp"
+#include "robots/online_model_file.hpp"
+#include "sim/simulation.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright {
 namespace {

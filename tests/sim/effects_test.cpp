@@ -8,11 +8,11 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/identify/least_squares.hpp>
-#include <wheelwright/model/effect_law.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "filter/measurement.hpp"
+#include "filter/row_stream.hpp"
+#include "identify/least_squares.hpp"
+#include "model/effect_law.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::sim::effects_test {
 namespace {

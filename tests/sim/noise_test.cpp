@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/sim/plant.hpp>
+#include "core/error.hpp"
+#include "sim/plant.hpp"
 
 namespace wheelwright::sim::noise_test {
 namespace {

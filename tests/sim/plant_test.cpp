@@ -5,10 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/sim/plant.hpp>
-
-#include "support/fault_oracle.hpp"
+#include "core/error.hpp"
+#include "sim/plant.hpp"
+#include "tests/support/fault_oracle.hpp"
 
 namespace wheelwright::sim::plant_test {
 namespace {

@@ -6,11 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "support/scratch.hpp"
+#include "core/error.hpp"
+#include "results/scenario_file.hpp"
+#include "sim/simulation.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace wheelwright::sim::scenario_file_test {
 namespace {

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "core/error.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::sim::simulation_test {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "core/error.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::sim::trajectory_test {
 namespace {

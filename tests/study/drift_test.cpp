@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Drift: what is certain, what is a trend, and how often chance is taken for one.
-#include <wheelwright/study/fleet_result.hpp>
+#include "study/fleet_result.hpp"
 
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include "study/fleets.hpp"
+#include "tests/study/fleets.hpp"
 
 namespace wheelwright::study::drift_test {
 namespace {

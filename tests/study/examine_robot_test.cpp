@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // A robot's record: the truth inside, later logs compared, and bad logs that stop nothing.
-#include <wheelwright/study/examine_robot.hpp>
+#include "study/examine_robot.hpp"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/study/fleet_result.hpp>
-#include <wheelwright/study/population.hpp>
-
-#include "study/simulated.hpp"
-#include "support/random.hpp"
+#include "study/fleet_result.hpp"
+#include "study/population.hpp"
+#include "tests/study/simulated.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::study::examine_robot_test {
 namespace {

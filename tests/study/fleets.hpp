@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/study/population.hpp>
-
-#include "support/random.hpp"
+#include "study/population.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::testing_support {
 

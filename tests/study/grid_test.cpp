@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/study/global_sensitivity.hpp>
+#include "core/error.hpp"
+#include "study/global_sensitivity.hpp"
 
 namespace wheelwright::study::grid_test {
 namespace {

@@ -2,10 +2,9 @@
 // Derivatives of the hull against the hull itself, solved anew beside the point.
 #include <gtest/gtest.h>
 
-#include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/study/bound_derivatives.hpp>
-
-#include "support/random.hpp"
+#include "bounds/feasible_set.hpp"
+#include "study/bound_derivatives.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::study::hull_derivatives_test {
 namespace {

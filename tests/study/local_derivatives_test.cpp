@@ -4,11 +4,10 @@
 
 #include <cmath>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/study/bound_derivatives.hpp>
-
-#include "support/drives.hpp"
+#include "commission/commission.hpp"
+#include "core/error.hpp"
+#include "study/bound_derivatives.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::study::local_derivatives_test {
 namespace {

@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/study/work.hpp>
+#include "study/work.hpp"
 
 namespace wheelwright::testing {
 

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pooled prior covers what it says, whatever the fleet is like, and says so where it cannot.
-#include <wheelwright/study/population.hpp>
+#include "study/population.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "study/fleets.hpp"
+#include "core/error.hpp"
+#include "tests/study/fleets.hpp"
 
 namespace wheelwright::study::pooled_prior_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Robots outside: few in fleets that are alike, all of those that are strange.
-#include <wheelwright/study/population.hpp>
+#include "study/population.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "study/fleets.hpp"
+#include "core/error.hpp"
+#include "tests/study/fleets.hpp"
 
 namespace wheelwright::study::population_test {
 namespace {

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Centre and spread: closed cases, recovery, and strange members that do not matter.
-#include <wheelwright/study/population.hpp>
+#include "study/population.hpp"
 
 #include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "support/random.hpp"
+#include "core/error.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::study::random_effects_test {
 namespace {

@@ -7,9 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include <wheelwright/study/examine_robot.hpp>
-
-#include "support/drives.hpp"
+#include "study/examine_robot.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::testing_support {
 

@@ -10,9 +10,8 @@
 #include <gtest/gtest.h>
 #include <boost/math/distributions/binomial.hpp>
 
-#include <wheelwright/study/global_sensitivity.hpp>
-
-#include "study/test_functions.hpp"
+#include "study/global_sensitivity.hpp"
+#include "tests/study/test_functions.hpp"
 
 namespace wheelwright::study::sobol_coverage_test {
 namespace {

@@ -5,11 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/core/limits.hpp>
-#include <wheelwright/study/global_sensitivity.hpp>
-
-#include "study/test_functions.hpp"
+#include "core/error.hpp"
+#include "core/limits.hpp"
+#include "study/global_sensitivity.hpp"
+#include "tests/study/test_functions.hpp"
 
 namespace wheelwright::study::sobol_indices_test {
 namespace {

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/study/global_sensitivity.hpp>
+#include "core/error.hpp"
+#include "study/global_sensitivity.hpp"
 
 namespace wheelwright::study::sobol_points_test {
 namespace {

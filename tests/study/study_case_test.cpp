@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/study_case.hpp>
+#include "study/study_case.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-#include <wheelwright/sim/simulation.hpp>
-
-#include "support/drives.hpp"
+#include "core/error.hpp"
+#include "sim/simulation.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::study::study_case_test {
 namespace {

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/study_quantity.hpp>
+#include "study/study_quantity.hpp"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/core/error.hpp>
-
-#include "support/drives.hpp"
+#include "commission/commission.hpp"
+#include "core/error.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::study::study_quantity_test {
 namespace {

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/study.hpp>
+#include "study/study.hpp"
 
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "support/drives.hpp"
+#include "core/error.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::study::study_test {
 namespace {

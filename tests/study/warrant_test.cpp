@@ -2,7 +2,7 @@
 // A fleet's column stands on what the weakest of its logs stands on.
 #include <gtest/gtest.h>
 
-#include <wheelwright/study/population.hpp>
+#include "study/population.hpp"
 
 namespace wheelwright::study::fleet_warrant_test {
 

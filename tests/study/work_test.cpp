@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/study/work.hpp>
+#include "study/work.hpp"
 
 #include <atomic>
 #include <set>
@@ -9,9 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "memory_store.hpp"
+#include "core/error.hpp"
+#include "tests/study/memory_store.hpp"
 
 namespace wheelwright::study::work_test {
 namespace {

@@ -9,10 +9,9 @@
 #include <string>
 #include <thread>
 
-#include <wheelwright/results/result_store.hpp>
-#include <wheelwright/study/work_on_ranks.hpp>
-
-#include "study/memory_store.hpp"
+#include "results/result_store.hpp"
+#include "study/work_on_ranks.hpp"
+#include "tests/study/memory_store.hpp"
 
 int main(int argc, char** argv) {
   using namespace wheelwright;

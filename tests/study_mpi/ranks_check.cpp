@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Run by mpirun on several ranks; each of them comes by every test, and expects what its rank should see.
-#include <wheelwright/study/work_on_ranks.hpp>
+#include "study/work_on_ranks.hpp"
 
 #include <atomic>
 #include <set>
@@ -11,9 +11,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
-
-#include "study/memory_store.hpp"
+#include "core/error.hpp"
+#include "tests/study/memory_store.hpp"
 
 namespace wheelwright::study {
 namespace {

@@ -16,7 +16,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/detector/detector.hpp>
+#include "detector/detector.hpp"
 
 namespace wheelwright::testing_support {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/filter/measurement.hpp>
-#include <wheelwright/filter/row_stream.hpp>
-#include <wheelwright/sim/simulation.hpp>
+#include "commission/commission.hpp"
+#include "filter/measurement.hpp"
+#include "filter/row_stream.hpp"
+#include "sim/simulation.hpp"
 
 namespace wheelwright::testing_support {
 

@@ -10,8 +10,8 @@
 #include <random>
 #include <vector>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::testing_support {
 

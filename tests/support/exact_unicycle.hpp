@@ -12,8 +12,8 @@
 #include <cstdint>
 #include <random>
 
-#include <wheelwright/core/log.hpp>
-#include <wheelwright/model/robot.hpp>
+#include "core/log.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::testing_support {
 

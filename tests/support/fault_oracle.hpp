@@ -7,8 +7,8 @@
 
 #include <Eigen/Core>
 
-#include <wheelwright/model/differential_drive.hpp>
-#include <wheelwright/model/faults.hpp>
+#include "model/differential_drive.hpp"
+#include "model/faults.hpp"
 
 namespace wheelwright {
 

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "support/drives.hpp"
+#include "tests/support/drives.hpp"
 
 namespace wheelwright::testing_support {
 

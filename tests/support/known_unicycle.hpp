@@ -11,9 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include <wheelwright/detector/pose_sums.hpp>
-
-#include "support/exact_unicycle.hpp"
+#include "detector/pose_sums.hpp"
+#include "tests/support/exact_unicycle.hpp"
 
 namespace wheelwright::testing_support {
 

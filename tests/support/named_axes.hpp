@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "support/exact_axis.hpp"
+#include "tests/support/exact_axis.hpp"
 
 namespace wheelwright::testing_support {
 

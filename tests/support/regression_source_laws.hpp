@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/regression.hpp>
+#include "core/regression.hpp"
 
 namespace wheelwright::testing_support {
 

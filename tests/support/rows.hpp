@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-#include <wheelwright/core/regression.hpp>
+#include "core/regression.hpp"
 
 namespace wheelwright::testing_support {
 

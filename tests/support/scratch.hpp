@@ -14,7 +14,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/core/error.hpp>
+#include "core/error.hpp"
 
 namespace wheelwright::testing {
 

@@ -5,12 +5,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/commission/commission.hpp>
-#include <wheelwright/words/commission_words.hpp>
-#include <wheelwright/words/summary.hpp>
-
-#include "support/exact_axis.hpp"
-#include "support/kinematic_drives.hpp"
+#include "commission/commission.hpp"
+#include "tests/support/exact_axis.hpp"
+#include "tests/support/kinematic_drives.hpp"
+#include "words/commission_words.hpp"
+#include "words/summary.hpp"
 
 namespace wheelwright::words::at_risk_words_test {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/words/detect_words.hpp>
+#include "words/detect_words.hpp"
 
 namespace wheelwright::words::margin_words_test {
 namespace {

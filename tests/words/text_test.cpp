@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <wheelwright/words/text.hpp>
+#include "words/text.hpp"
 
 #include <cmath>
 #include <limits>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/page.hpp>
+#include "report/page.hpp"
 
 namespace wheelwright::words {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Each outcome has its sentences.
-#include <wheelwright/model/fault_type.hpp>
-#include <wheelwright/words/commission_words.hpp>
-#include <wheelwright/words/detect_words.hpp>
+#include "model/fault_type.hpp"
+#include "words/commission_words.hpp"
+#include "words/detect_words.hpp"
 
 #include <cmath>
 #include <limits>
@@ -11,10 +11,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <wheelwright/report/commission_report.hpp>
-#include <wheelwright/report/detect_report.hpp>
-
-#include "report/example.hpp"
+#include "report/commission_report.hpp"
+#include "report/detect_report.hpp"
+#include "tests/report/example.hpp"
 
 namespace wheelwright::words {
 namespace {
