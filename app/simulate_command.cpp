@@ -10,8 +10,8 @@
 #include "app/common.hpp"
 #include "files/json.hpp"
 #include "logs/log_file.hpp"
+#include "model/sim/simulation.hpp"
 #include "results/scenario_file.hpp"
-#include "sim/simulation.hpp"
 
 namespace wheelwright::app {
 namespace simulate_command {

@@ -16,9 +16,9 @@
 #include "core/error.hpp"
 #include "detector/detector.hpp"
 #include "export/export_c.hpp"
-#include "filter/measurement.hpp"
-#include "filter/row_stream.hpp"
-#include "sim/simulation.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/row_stream.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::bench::detector_bench {
 

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "core/check.hpp"
-#include "filter/kernel.hpp"
-#include "sim/plant.hpp"
+#include "model/filter/kernel.hpp"
+#include "model/sim/plant.hpp"
 
 namespace wheelwright::bench {
 namespace {

@@ -37,7 +37,7 @@ struct DriveRows {
 };
 
 /// Rows of a robot that follows slow multi-sine speeds at 100 Hz, with reversals and turns, filtered by f₂ with
-/// α = β = 20/s as the library filters them (filter/kernel.hpp): neighbouring rows of a channel are nearly equal.
+/// α = β = 20/s as the library filters them (model/filter/kernel.hpp): neighbouring rows of a channel are nearly equal.
 ///
 ///     p = 4   mass, yaw inertia, viscous friction of the right and of the left wheel
 ///     p = 6   and offset of the centre of mass (−v2², v1 v2), viscous friction of yaw

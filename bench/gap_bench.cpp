@@ -19,7 +19,7 @@
 #include "bench/bench.hpp"
 #include "gap/diagnose.hpp"
 #include "gap/prepared.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::bench::gap_bench {
 namespace {

@@ -20,8 +20,8 @@
 #include "commission/commission.hpp"
 #include "commission/detector_walk.hpp"
 #include "core/error.hpp"
-#include "filter/row_stream.hpp"
 #include "logs/csv.hpp"
+#include "model/filter/row_stream.hpp"
 #include "robots/robot_file.hpp"
 
 using namespace wheelwright;

@@ -33,8 +33,8 @@
 #include "core/error.hpp"
 #include "detector/margins.hpp"
 #include "logs/csv.hpp"
+#include "model/sim/simulation.hpp"
 #include "robots/robot_file.hpp"
-#include "sim/simulation.hpp"
 
 using namespace wheelwright;
 

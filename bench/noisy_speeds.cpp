@@ -22,7 +22,7 @@
 #include "commission/setting.hpp"
 #include "core/statistics.hpp"
 #include "identify/noise_level.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::bench {
 namespace {

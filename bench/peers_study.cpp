@@ -27,7 +27,7 @@
 #include "bench/peers/bank.hpp"
 #include "bench/peers/field.hpp"
 #include "core/error.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 
 using namespace wheelwright;
 using namespace wheelwright::peers;

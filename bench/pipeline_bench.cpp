@@ -24,10 +24,10 @@
 #include "commission/commission.hpp"
 #include "commission/detector_walk.hpp"
 #include "core/error.hpp"
-#include "filter/row_stream.hpp"
 #include "identify/least_squares.hpp"
 #include "logs/csv.hpp"
-#include "sim/simulation.hpp"
+#include "model/filter/row_stream.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::bench::pipeline_bench {
 namespace {

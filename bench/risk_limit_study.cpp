@@ -26,7 +26,7 @@
 #include "bench/peers/field.hpp"
 #include "core/error.hpp"
 #include "detector/scale_detector.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 
 using namespace wheelwright;
 using namespace wheelwright::peers;

@@ -17,7 +17,7 @@
 #include "commission/setting.hpp"
 #include "commission/two_walks.hpp"
 #include "core/check.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 

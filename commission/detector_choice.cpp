@@ -16,9 +16,9 @@
 #include "core/error.hpp"
 #include "core/for_all.hpp"
 #include "core/limits.hpp"
-#include "filter/measurement.hpp"
 #include "identify/minimise_scalar.hpp"
 #include "model/fault_type.hpp"
+#include "model/filter/measurement.hpp"
 
 namespace wheelwright::commission {
 

@@ -15,8 +15,8 @@
 #include "commission/commission.hpp"
 #include "core/log.hpp"
 #include "detector/events.hpp"
-#include "filter/measurement.hpp"
-#include "filter/noise.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/noise.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::commission {

@@ -13,8 +13,8 @@
 #include "bounds/box.hpp"
 #include "core/limits.hpp"
 #include "core/log.hpp"
-#include "filter/element_filter.hpp"
-#include "filter/sample_weights.hpp"
+#include "model/filter/element_filter.hpp"
+#include "model/filter/sample_weights.hpp"
 
 namespace wheelwright::commission {
 

@@ -7,7 +7,7 @@
 
 #include "core/log.hpp"
 #include "detector/online_model.hpp"
-#include "filter/error_class.hpp"
+#include "model/filter/error_class.hpp"
 
 namespace wheelwright::commission {
 

@@ -6,7 +6,7 @@
 
 #include "commission/noise_budget.hpp"
 #include "core/linear_algebra.hpp"
-#include "filter/noise.hpp"
+#include "model/filter/noise.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -12,7 +12,7 @@
 #include "commission/setting.hpp"
 #include "core/interval.hpp"
 #include "core/log.hpp"
-#include "filter/noise.hpp"
+#include "model/filter/noise.hpp"
 
 namespace wheelwright::commission {
 

@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 
 #include "core/check.hpp"
-#include "filter/row_stream.hpp"
 #include "identify/least_squares.hpp"
 #include "identify/minimise_scalar.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 namespace {

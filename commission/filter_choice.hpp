@@ -13,7 +13,7 @@
 #include "commission/filter_criterion.hpp"
 #include "commission/survey.hpp"
 #include "core/log.hpp"
-#include "filter/measurement.hpp"
+#include "model/filter/measurement.hpp"
 #include "model/model.hpp"
 
 namespace wheelwright::commission {

@@ -10,11 +10,11 @@
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
-#include "filter/noise.hpp"
-#include "filter/row_stream.hpp"
 #include "identify/estimate.hpp"
 #include "identify/least_squares.hpp"
 #include "identify/noise_level.hpp"
+#include "model/filter/noise.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/log.hpp"
-#include "filter/measurement.hpp"
+#include "model/filter/measurement.hpp"
 #include "model/model.hpp"
 
 namespace wheelwright::commission {

@@ -16,8 +16,8 @@
 #include "commission/validation.hpp"
 #include "core/log.hpp"
 #include "detector/online_model.hpp"
-#include "filter/row_stream.hpp"
 #include "identify/least_squares.hpp"
+#include "model/filter/row_stream.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::commission {

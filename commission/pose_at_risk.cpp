@@ -12,7 +12,7 @@
 #include "commission/sum_spread.hpp"
 #include "core/regression.hpp"
 #include "core/statistics.hpp"
-#include "filter/measurement.hpp"
+#include "model/filter/measurement.hpp"
 
 namespace wheelwright::commission {
 namespace {

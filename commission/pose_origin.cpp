@@ -12,8 +12,8 @@
 #include <Eigen/Core>
 
 #include "core/linear_algebra.hpp"
-#include "filter/encoder.hpp"
 #include "identify/least_squares.hpp"
+#include "model/filter/encoder.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/log.hpp"
-#include "filter/odometry_filter.hpp"
+#include "model/filter/odometry_filter.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::commission {

@@ -13,9 +13,9 @@
 #include "core/check.hpp"
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
-#include "filter/element_filter.hpp"
-#include "filter/predictable_regressor.hpp"
-#include "filter/sample_weights.hpp"
+#include "model/filter/element_filter.hpp"
+#include "model/filter/predictable_regressor.hpp"
+#include "model/filter/sample_weights.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -12,9 +12,9 @@
 #include "bounds/polytope.hpp"
 #include "core/log.hpp"
 #include "core/warrant.hpp"
-#include "filter/error_class.hpp"
-#include "filter/measurement.hpp"
-#include "filter/noise.hpp"
+#include "model/filter/error_class.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/noise.hpp"
 #include "model/model.hpp"
 
 namespace wheelwright::commission {

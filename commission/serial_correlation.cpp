@@ -11,7 +11,7 @@
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/regression.hpp"
-#include "filter/sample_weights.hpp"
+#include "model/filter/sample_weights.hpp"
 
 namespace wheelwright::commission {
 namespace {

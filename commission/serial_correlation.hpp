@@ -9,8 +9,8 @@
 
 #include "bounds/polytope.hpp"
 #include "core/log.hpp"
-#include "filter/element_filter.hpp"
-#include "filter/error_class.hpp"
+#include "model/filter/element_filter.hpp"
+#include "model/filter/error_class.hpp"
 
 namespace wheelwright::commission {
 

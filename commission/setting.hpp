@@ -15,10 +15,10 @@
 #include "commission/survey.hpp"
 #include "commission/validation.hpp"
 #include "core/log.hpp"
-#include "filter/measurement.hpp"
-#include "filter/noise.hpp"
-#include "filter/row_stream.hpp"
 #include "identify/estimate.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/noise.hpp"
+#include "model/filter/row_stream.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::commission {

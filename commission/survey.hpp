@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "filter/measurement.hpp"
+#include "model/filter/measurement.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::commission {

@@ -12,8 +12,8 @@
 #include "core/limits.hpp"
 #include "detector/fault_margin.hpp"
 #include "detector/sum_response.hpp"
-#include "filter/motion_bound.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/motion_bound.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::design {
 

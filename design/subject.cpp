@@ -16,7 +16,7 @@
 #include "core/check.hpp"
 #include "core/error.hpp"
 #include "design/plan.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::design {
 namespace {

@@ -12,7 +12,7 @@
 #include "core/regression.hpp"
 #include "core/warrant.hpp"
 #include "detector/reference_motion.hpp"
-#include "filter/error_class.hpp"
+#include "model/filter/error_class.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::design {

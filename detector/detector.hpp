@@ -15,7 +15,7 @@
 #include "core/check.hpp"
 #include "detector/events.hpp"
 #include "detector/threshold.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::detector {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "detector/reference_motion.hpp"
-#include "filter/kernel.hpp"
 #include "model/fault_type.hpp"
+#include "model/filter/kernel.hpp"
 
 namespace wheelwright::detector {
 
@@ -126,7 +126,7 @@ class SignatureErrors {
   Row out_;
 };
 
-/// A fault's signature along a reference motion, element by element of the weak form (filter/element_filter.hpp): what
+/// A fault's signature along a reference motion, element by element of the weak form (model/filter/element_filter.hpp): what
 /// it adds between one instant and the next is shares()[0] at_begin() + shares()[1] at_end(), and in the first element
 /// after an onset jump(), whatever weights the elements are summed with.
 ///

@@ -17,8 +17,8 @@
 #include "detector/fault_margin.hpp"
 #include "detector/fault_rows.hpp"
 #include "detector/reference_motion.hpp"
-#include "filter/noise.hpp"
 #include "model/fault_type.hpp"
+#include "model/filter/noise.hpp"
 
 namespace wheelwright::detector {
 

@@ -11,7 +11,7 @@
 #include "core/log.hpp"
 #include "detector/fault_rows.hpp"
 #include "detector/reference_motion.hpp"
-#include "filter/odometry_filter.hpp"
+#include "model/filter/odometry_filter.hpp"
 
 namespace wheelwright::detector {
 

@@ -10,7 +10,7 @@
 #include "core/check.hpp"
 #include "core/limits.hpp"
 #include "detector/sum_kernel.hpp"
-#include "filter/kernel.hpp"
+#include "model/filter/kernel.hpp"
 
 namespace wheelwright::detector {
 namespace {

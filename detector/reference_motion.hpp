@@ -11,7 +11,7 @@
 
 #include "core/log.hpp"
 #include "core/regression.hpp"
-#include "filter/regressor_filter.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::detector {
 

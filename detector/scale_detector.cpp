@@ -9,7 +9,7 @@
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "detector/sum_kernel.hpp"
-#include "filter/kernel.hpp"
+#include "model/filter/kernel.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -14,8 +14,8 @@
 #include "core/log.hpp"
 #include "detector/online_model.hpp"
 #include "detector/threshold.hpp"
-#include "filter/element_filter.hpp"
-#include "filter/predictable_regressor.hpp"
+#include "model/filter/element_filter.hpp"
+#include "model/filter/predictable_regressor.hpp"
 
 namespace wheelwright::detector {
 

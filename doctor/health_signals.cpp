@@ -9,9 +9,9 @@
 
 #include "core/error.hpp"
 #include "doctor/log_health.hpp"
-#include "filter/encoder.hpp"
 #include "identify/noise_level.hpp"
 #include "inference/noise_levels.hpp"
+#include "model/filter/encoder.hpp"
 
 namespace wheelwright::doctor {
 namespace {

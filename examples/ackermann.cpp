@@ -21,8 +21,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/bounds/feasible_set.hpp>
-#include <wheelwright/filter/row_stream.hpp>
 #include <wheelwright/identify/least_squares.hpp>
+#include <wheelwright/model/filter/row_stream.hpp>
 
 using namespace wheelwright;
 

@@ -14,8 +14,8 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/model/sim/simulation.hpp>
 #include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
 
 using namespace wheelwright;
 

@@ -16,8 +16,8 @@
 
 #include <wheelwright/gap/diagnose.hpp>
 #include <wheelwright/gap/effect.hpp>
+#include <wheelwright/model/sim/simulation.hpp>
 #include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
 
 using namespace wheelwright;
 

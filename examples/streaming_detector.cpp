@@ -14,8 +14,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/model/sim/simulation.hpp>
 #include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
 
 namespace {
 std::size_t allocations = 0;  // since the program began

@@ -15,9 +15,9 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/filter/row_stream.hpp>
+#include <wheelwright/model/filter/row_stream.hpp>
+#include <wheelwright/model/sim/simulation.hpp>
 #include <wheelwright/results/scenario_file.hpp>
-#include <wheelwright/sim/simulation.hpp>
 
 using namespace wheelwright;
 

@@ -21,9 +21,9 @@ using model::TermShape;
 
 namespace {
 
-constexpr double kOutward = 1.0 + 64.0 * core::kEpsilon;  // kUp of filter/motion_bound.cpp
+constexpr double kOutward = 1.0 + 64.0 * core::kEpsilon;  // kUp of model/filter/motion_bound.cpp
 constexpr int kWidenings = 12;                            // kRounds there
-constexpr double kAlikeSteps = 0.05;                      // kAlike of filter/regressor_filter.cpp
+constexpr double kAlikeSteps = 0.05;                      // kAlike of model/filter/regressor_filter.cpp
 
 bool any_kind(const Model& model, Term::Kind kind) {
   return std::ranges::any_of(model.terms, [&](const Term& term) { return term.kind == kind; });

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "filter/regressor_filter.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::exporter::c_text {
 
@@ -33,7 +33,7 @@ class FilterWriter {
   /// says whether there is a row, and pfx_row, which gives it; pfx_forget, after which the next sample starts a
   /// segment.
   [[nodiscard]] std::string functions() const;
-  /// Function pfx_regressor: element_regressor() of filter/sample_weights.hpp.
+  /// Function pfx_regressor: element_regressor() of model/filter/sample_weights.hpp.
   [[nodiscard]] std::string regressor() const;
 
   /// Lines of the header's comment: how efforts are taken, when a segment ends, what of libm is called.

@@ -47,16 +47,16 @@ template <typename Of>
 extern const std::string_view kCompiler;
 /// Types: channel, decision (detector/detector.hpp).
 extern const std::string_view kTypes;
-/// FilterKernel (filter/kernel.hpp) for nodes, smoothed and not: state, weights of a step, prepare, take, value.
+/// FilterKernel (model/filter/kernel.hpp) for nodes, smoothed and not: state, weights of a step, prepare, take, value.
 extern const std::string_view kSmoothKernel;
 extern const std::string_view kNodeKernel;
-/// exponential_moments() (filter/kernel.hpp) as far as speeds need it, and FilterKernel for them: order 1 and 2.
+/// exponential_moments() (model/filter/kernel.hpp) as far as speeds need it, and FilterKernel for them: order 1 and 2.
 extern const std::string_view kFirstOrderKernel;
 extern const std::string_view kSpeedKernel;
-/// faded() (filter/kernel.hpp) of all numbers of a piece of memory, around the comparison with kTrace.
+/// faded() (model/filter/kernel.hpp) of all numbers of a piece of memory, around the comparison with kTrace.
 extern const std::string_view kFade;
 extern const std::string_view kFaded;
-/// SlopeMajorant (filter/kernel.hpp).
+/// SlopeMajorant (model/filter/kernel.hpp).
 extern const std::string_view kMajorant;
 /// Box::support, of the hull.
 extern const std::string_view kHull;

@@ -4,12 +4,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "filter/measurement.hpp"
 #include "fuzz/fuzz.hpp"
 #include "gap/discrimination.hpp"
 #include "gap/drive.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/sim/simulation.hpp"
 #include "results/gap_json.hpp"
-#include "sim/simulation.hpp"
 
 using namespace wheelwright;
 

@@ -3,8 +3,8 @@
 
 #include "core/error.hpp"
 #include "fuzz/fuzz.hpp"
+#include "model/sim/simulation.hpp"
 #include "results/scenario_file.hpp"
-#include "sim/simulation.hpp"
 
 using namespace wheelwright;
 

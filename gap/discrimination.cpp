@@ -11,9 +11,9 @@
 #include "commission/noise_budget.hpp"
 #include "core/check.hpp"
 #include "core/linear_algebra.hpp"
-#include "filter/noise.hpp"
 #include "gap/block_gram.hpp"
 #include "gap/drive.hpp"
+#include "model/filter/noise.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -8,8 +8,8 @@
 #include <Eigen/Core>
 
 #include "core/check.hpp"
-#include "filter/kernel.hpp"
 #include "gap/drive.hpp"
+#include "model/filter/kernel.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -12,8 +12,8 @@
 
 #include "core/check.hpp"
 #include "core/linear_algebra.hpp"
-#include "filter/kernel.hpp"
 #include "model/effect_law.hpp"
+#include "model/filter/kernel.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -15,10 +15,10 @@
 #include "core/random.hpp"
 #include "core/words.hpp"
 #include "design/stages.hpp"
-#include "filter/measurement.hpp"
 #include "gap/discrimination_design.hpp"
 #include "gap/estimates.hpp"
 #include "gap/prepared.hpp"
+#include "model/filter/measurement.hpp"
 
 namespace wheelwright::gap {
 namespace {

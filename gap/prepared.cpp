@@ -12,11 +12,11 @@
 
 #include "core/error.hpp"
 #include "core/linear_algebra.hpp"
-#include "filter/measurement.hpp"
 #include "gap/drive.hpp"
 #include "gap/effect.hpp"
 #include "gap/noise_floor.hpp"
 #include "gap/selection.hpp"
+#include "model/filter/measurement.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -10,9 +10,9 @@
 #include "core/check.hpp"
 #include "core/for_all.hpp"
 #include "model/effect_law.hpp"
-#include "sim/drivetrain.hpp"
-#include "sim/plant.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/drivetrain.hpp"
+#include "model/sim/plant.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -17,7 +17,7 @@
 #include "gap/noise_floor.hpp"
 #include "gap/prepared.hpp"
 #include "identify/noise_level.hpp"
-#include "sim/plant.hpp"
+#include "model/sim/plant.hpp"
 
 namespace wheelwright::gap {
 namespace {

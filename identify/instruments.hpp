@@ -12,7 +12,7 @@
 
 #include "core/log.hpp"
 #include "core/regression.hpp"
-#include "filter/regressor_filter.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::identify {
 

@@ -16,13 +16,13 @@
 #include "commission/setting.hpp"
 #include "core/interval.hpp"
 #include "core/log.hpp"
-#include "filter/regressor_filter.hpp"
 #include "identify/variable_projection.hpp"
 #include "inference/identifiability.hpp"
 #include "inference/kinematic_calibration.hpp"
 #include "inference/noise_levels.hpp"
 #include "inference/regions.hpp"
 #include "inference/robust.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::inference {
 
@@ -30,7 +30,7 @@ namespace wheelwright::inference {
 /// efforts to outputs) and f the torque filter: p + 1 linear parameters, the last is c (N·m at each joint), and the
 /// shape ω_s (rad/s, or m/s for a joint that is driven straight).
 ///
-/// The recursion is RegressorFilter's own (filter/kernel.hpp). Measured speeds give g at the samples, linear between
+/// The recursion is RegressorFilter's own (model/filter/kernel.hpp). Measured speeds give g at the samples, linear between
 /// them as measured efforts are; angles and mean speeds give g of each step's mean speed, as every other function of
 /// the motion. A model with Coulomb friction already in Y keeps it: c is what is added at low speed. Without slow
 /// driving ω_s is flat (ShapeState::flat).

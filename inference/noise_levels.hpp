@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "filter/measurement.hpp"
 #include "identify/noise_level.hpp"
+#include "model/filter/measurement.hpp"
 
 namespace wheelwright::inference {
 

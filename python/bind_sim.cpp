@@ -15,6 +15,7 @@
 #include "gap/discrimination_design.hpp"
 #include "gap/effect.hpp"
 #include "gap/named_rivals.hpp"
+#include "model/sim/simulation.hpp"
 #include "python/arrays.hpp"
 #include "python/module.hpp"
 #include "results/design_json.hpp"
@@ -22,7 +23,6 @@
 #include "results/scenario_file.hpp"
 #include "results/software.hpp"
 #include "robots/robot_file.hpp"
-#include "sim/simulation.hpp"
 #include "words/summary.hpp"
 
 namespace wheelwright::python {

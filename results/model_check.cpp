@@ -10,7 +10,7 @@
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
 #include "commission/pose_at_risk.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 #include "results/model_json.hpp"
 #include "results/risk_check.hpp"
 

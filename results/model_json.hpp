@@ -12,7 +12,7 @@
 #include "core/warrant.hpp"
 #include "files/json.hpp"
 #include "files/words.hpp"
-#include "filter/error_class.hpp"
+#include "model/filter/error_class.hpp"
 #include "robots/robot_keys.hpp"
 
 namespace wheelwright::results {

@@ -30,7 +30,7 @@
 #include "core/log.hpp"
 #include "core/regression.hpp"
 #include "core/warrant.hpp"
-#include "filter/measurement.hpp"
+#include "model/filter/measurement.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::study {

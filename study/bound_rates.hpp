@@ -22,7 +22,7 @@
 
 #include "commission/commission.hpp"
 #include "core/log.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 #include "study/bound_derivatives.hpp"
 
 namespace wheelwright::study {

@@ -10,7 +10,7 @@
 
 #include "core/check.hpp"
 #include "core/random.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::study {
 

@@ -18,14 +18,14 @@ LAYERS = [
     ("on the robot", {
         "core": "core",
         "model": "model",
-        "filter": "filter",
+        "filter": "model/filter",
         "bounds": "bounds",
         "detector": "detector",
     }),
     ("formats", {
         "files": "files",
         "logs": "logs",
-        "sim": "sim",
+        "sim": "model/sim",
         "robots": "robots",
     }),
     ("commissioning", {
@@ -318,7 +318,7 @@ def self_test():
         "@inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
         "@study/work_on_ranks.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
         "@detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
-        "@filter/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",
+        "@model/filter/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",
         "@detector/shared.cpp": spdx + '#include "@filter/s.hpp"\n',
         "examples/e.cpp": spdx + "#include <wheelwright/core/a.hpp>\n",
         "docs/framework.md": "framework/works on http://host/working and a/" + "work\n",

@@ -22,8 +22,8 @@
 #include "core/log.hpp"
 #include "files/bytes.hpp"
 #include "logs/log_file.hpp"
+#include "model/sim/simulation.hpp"
 #include "robots/robot_file.hpp"
-#include "sim/simulation.hpp"
 
 namespace {
 

@@ -21,9 +21,9 @@
 #include <Eigen/Core>
 
 #include "detector/reference_motion.hpp"
-#include "filter/measurement.hpp"
-#include "filter/noise.hpp"
 #include "model/fault_type.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/noise.hpp"
 #include "model/model.hpp"
 
 namespace wheelwright::bench {

@@ -29,9 +29,9 @@
 #include "core/log.hpp"
 #include "detector/fault_rows.hpp"
 #include "detector/reference_motion.hpp"
-#include "filter/measurement.hpp"
-#include "filter/noise.hpp"
 #include "model/fault_type.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/noise.hpp"
 #include "model/model.hpp"
 
 namespace wheelwright::bench {

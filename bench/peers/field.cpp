@@ -6,8 +6,8 @@
 #include <string>
 
 #include "detector/margins.hpp"
-#include "filter/row_stream.hpp"
 #include "identify/least_squares.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::peers {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <span>
 
-#include "filter/regressor_filter.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::peers {
 

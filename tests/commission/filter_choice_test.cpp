@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "filter/row_stream.hpp"
 #include "identify/estimate.hpp"
+#include "model/filter/row_stream.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/random.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "commission/validation.hpp"
 #include "core/error.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/rows.hpp"

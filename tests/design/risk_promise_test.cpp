@@ -13,7 +13,7 @@
 #include "design/stages.hpp"
 #include "detector/scale_detector.hpp"
 #include "detector/sum_margins.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 #include "tests/design/robots.hpp"
 
 namespace wheelwright::design::risk_promise_test {

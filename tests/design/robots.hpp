@@ -9,7 +9,7 @@
 
 #include "design/stages.hpp"
 #include "model/robot.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::testing_support {
 

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 #include "tests/design/robots.hpp"
 
 namespace wheelwright::design::slow_manoeuvre_test {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 #include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::detector::kinematic_detector_test {

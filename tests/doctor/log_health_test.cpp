@@ -12,9 +12,9 @@
 
 #include "doctor/log_health.hpp"
 #include "logs/csv.hpp"
+#include "model/sim/simulation.hpp"
 #include "results/health_json.hpp"
 #include "robots/robot_file.hpp"
-#include "sim/simulation.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/kinematic_drives.hpp"
 #include "tests/support/skip.hpp"

@@ -6,8 +6,8 @@
 #include <Eigen/LU>
 
 #include "export/export_c.hpp"
-#include "filter/motion_bound.hpp"
 #include "model/differential_drive.hpp"
+#include "model/filter/motion_bound.hpp"
 #include "model/single_axis.hpp"
 #include "tests/support/c_detector.hpp"
 #include "tests/support/random.hpp"

@@ -8,8 +8,8 @@
 
 #include "bounds/slab_rows.hpp"
 #include "export/export_c.hpp"
-#include "filter/motion_bound.hpp"
 #include "model/differential_drive.hpp"
+#include "model/filter/motion_bound.hpp"
 #include "model/robot.hpp"
 #include "model/single_axis.hpp"
 #include "tests/support/c_detector.hpp"

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "filter/effort_correction.hpp"
+#include "model/filter/effort_correction.hpp"
 
 namespace wheelwright::filter::effort_correction_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/encoder.hpp"
-#include "filter/measurement.hpp"
+#include "model/filter/encoder.hpp"
+#include "model/filter/measurement.hpp"
 
 #include <cmath>
 #include <numbers>

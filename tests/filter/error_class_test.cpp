@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/error_class.hpp"
+#include "model/filter/error_class.hpp"
 
 #include <algorithm>
 #include <cmath>

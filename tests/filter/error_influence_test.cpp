@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "core/log.hpp"
-#include "filter/noise.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/noise.hpp"
+#include "model/filter/row_stream.hpp"
 #include "tests/support/drives.hpp"
 
 namespace wheelwright::filter::error_influence_test {

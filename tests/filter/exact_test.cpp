@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: the convolution integral itself, in 60-digit arithmetic, for inputs that are linear between samples.
-#include "filter/kernel.hpp"
+#include "model/filter/kernel.hpp"
 
 #include <random>
 #include <vector>

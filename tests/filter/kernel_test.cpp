@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: KernelState, one signal by itself.
-#include "filter/kernel.hpp"
+#include "model/filter/kernel.hpp"
 
 #include <cmath>
 #include <random>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/noise.hpp"
+#include "model/filter/noise.hpp"
 
 #include <array>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "filter/regressor_filter.hpp"
 #include "model/differential_drive.hpp"
+#include "model/filter/regressor_filter.hpp"
 #include "model/single_axis.hpp"
 
 namespace wheelwright::filter::noise_test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/odometry_filter.hpp"
+#include "model/filter/odometry_filter.hpp"
 
 #include <array>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 #include "tests/support/random.hpp"
 
 namespace wheelwright::filter::odometry_filter_test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 
 #include <cmath>
 #include <random>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rows against a plant that is solved exactly between the events of its efforts: |y − Yθ| <= dy + dY|θ|, every row.
-#include "filter/regressor_filter.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 #include <cmath>
 #include <numbers>

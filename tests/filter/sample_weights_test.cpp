@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Weights of single samples, against what a sum does when that sample is moved.
-#include "filter/sample_weights.hpp"
+#include "model/filter/sample_weights.hpp"
 
 #include <cmath>
 #include <map>
@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "filter/predictable_regressor.hpp"
 #include "model/differential_drive.hpp"
+#include "model/filter/predictable_regressor.hpp"
 #include "model/single_axis.hpp"
 #include "tests/support/random.hpp"
 

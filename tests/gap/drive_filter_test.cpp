@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "filter/regressor_filter.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::gap::drive_filter_test {
 namespace {

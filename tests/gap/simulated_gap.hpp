@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "filter/measurement.hpp"
 #include "gap/block_gram.hpp"
 #include "gap/effect.hpp"
 #include "gap/gap_rows.hpp"
-#include "sim/simulation.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::gap::gap_example {
 

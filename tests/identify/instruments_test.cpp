@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "filter/row_stream.hpp"
+#include "model/filter/row_stream.hpp"
 #include "model/single_axis.hpp"
 #include "tests/support/drives.hpp"
 

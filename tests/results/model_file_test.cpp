@@ -8,9 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "model/sim/simulation.hpp"
 #include "results/model_file.hpp"
 #include "results/scenario_file.hpp"
-#include "sim/simulation.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace wheelwright::results::model_file_test {

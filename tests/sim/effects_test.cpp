@@ -8,11 +8,11 @@
 
 #include <gtest/gtest.h>
 
-#include "filter/measurement.hpp"
-#include "filter/row_stream.hpp"
 #include "identify/least_squares.hpp"
 #include "model/effect_law.hpp"
-#include "sim/simulation.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/row_stream.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::sim::effects_test {
 namespace {

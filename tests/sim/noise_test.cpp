@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "sim/plant.hpp"
+#include "model/sim/plant.hpp"
 
 namespace wheelwright::sim::noise_test {
 namespace {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "sim/plant.hpp"
+#include "model/sim/plant.hpp"
 #include "tests/support/fault_oracle.hpp"
 
 namespace wheelwright::sim::plant_test {

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
+#include "model/sim/simulation.hpp"
 #include "results/scenario_file.hpp"
-#include "sim/simulation.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace wheelwright::sim::scenario_file_test {

@@ -9,7 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "core/error.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::sim::simulation_test {
 namespace {

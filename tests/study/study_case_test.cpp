@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 #include "tests/support/drives.hpp"
 
 namespace wheelwright::study::study_case_test {

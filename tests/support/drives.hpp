@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "commission/commission.hpp"
-#include "filter/measurement.hpp"
-#include "filter/row_stream.hpp"
-#include "sim/simulation.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/row_stream.hpp"
+#include "model/sim/simulation.hpp"
 
 namespace wheelwright::testing_support {
 

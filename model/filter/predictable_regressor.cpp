@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/predictable_regressor.hpp"
+#include "model/filter/predictable_regressor.hpp"
 
 #include <cmath>
 
 #include "core/check.hpp"
-#include "filter/kernel.hpp"
-#include "filter/sample_weights.hpp"
+#include "model/filter/kernel.hpp"
+#include "model/filter/sample_weights.hpp"
 
 namespace wheelwright::filter {
 

@@ -13,8 +13,8 @@
 #include "core/check.hpp"
 #include "core/log.hpp"
 #include "core/regression.hpp"
-#include "filter/odometry_filter.hpp"
-#include "filter/regressor_filter.hpp"
+#include "model/filter/odometry_filter.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::filter {
 

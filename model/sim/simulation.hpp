@@ -18,8 +18,8 @@
 #include "model/differential_drive.hpp"
 #include "model/faults.hpp"
 #include "model/robot.hpp"
-#include "sim/drivetrain.hpp"
-#include "sim/plant.hpp"
+#include "model/sim/drivetrain.hpp"
+#include "model/sim/plant.hpp"
 
 namespace wheelwright::sim {
 

@@ -8,7 +8,7 @@
 #include <cstddef>
 
 #include "core/limits.hpp"
-#include "filter/sample_weights.hpp"
+#include "model/filter/sample_weights.hpp"
 
 namespace wheelwright::filter {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim/simulation.hpp"
+#include "model/sim/simulation.hpp"
 
 #include <algorithm>
 #include <array>

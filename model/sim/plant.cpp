@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim/plant.hpp"
+#include "model/sim/plant.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/encoder.hpp"
+#include "model/filter/encoder.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/regression.hpp"
-#include "filter/element_filter.hpp"
+#include "model/filter/element_filter.hpp"
 
 namespace wheelwright::filter {
 

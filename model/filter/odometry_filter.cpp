@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/odometry_filter.hpp"
+#include "model/filter/odometry_filter.hpp"
 
 #include <algorithm>
 #include <cmath>

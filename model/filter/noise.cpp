@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/noise.hpp"
+#include "model/filter/noise.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "core/check.hpp"
-#include "filter/kernel.hpp"
+#include "model/filter/kernel.hpp"
 
 namespace wheelwright::filter {
 namespace {

@@ -10,8 +10,8 @@
 #include <Eigen/Core>
 
 #include "core/regression.hpp"
-#include "filter/measurement.hpp"
-#include "filter/motion_bound.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/motion_bound.hpp"
 #include "model/model.hpp"
 
 namespace wheelwright::filter {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/sample_weights.hpp"
+#include "model/filter/sample_weights.hpp"
 
 #include <cmath>
 #include <utility>

@@ -10,10 +10,10 @@
 
 #include <Eigen/Core>
 
-#include "filter/effort_correction.hpp"
-#include "filter/measurement.hpp"
-#include "filter/motion_bound.hpp"
-#include "filter/noise.hpp"
+#include "model/filter/effort_correction.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/motion_bound.hpp"
+#include "model/filter/noise.hpp"
 #include "model/model.hpp"
 
 namespace wheelwright::filter {

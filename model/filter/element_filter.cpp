@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/element_filter.hpp"
+#include "model/filter/element_filter.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "core/check.hpp"
 #include "core/limits.hpp"
-#include "filter/in_order.hpp"
+#include "model/filter/in_order.hpp"
 
 namespace wheelwright::filter {
 namespace {

@@ -16,7 +16,7 @@
 
 #include <Eigen/Core>
 
-#include "filter/measurement.hpp"
+#include "model/filter/measurement.hpp"
 
 namespace wheelwright::filter {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/effort_correction.hpp"
+#include "model/filter/effort_correction.hpp"
 
 #include <algorithm>
 #include <cmath>

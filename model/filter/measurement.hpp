@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "filter/effort_correction.hpp"
+#include "model/filter/effort_correction.hpp"
 #include "model/model.hpp"
 #include "model/robot.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/measurement.hpp"
+#include "model/filter/measurement.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "core/check.hpp"
 #include "core/statistics.hpp"
 #include "core/words.hpp"
-#include "filter/encoder.hpp"
+#include "model/filter/encoder.hpp"
 
 namespace wheelwright::filter {
 

@@ -10,10 +10,10 @@
 #include <Eigen/Core>
 
 #include "core/regression.hpp"
-#include "filter/element_filter.hpp"
-#include "filter/kernel.hpp"
-#include "filter/measurement.hpp"
-#include "filter/noise.hpp"
+#include "model/filter/element_filter.hpp"
+#include "model/filter/kernel.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/noise.hpp"
 #include "model/model.hpp"
 
 namespace wheelwright::filter {

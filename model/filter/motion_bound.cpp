@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filter/motion_bound.hpp"
+#include "model/filter/motion_bound.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "core/check.hpp"
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
-#include "filter/in_order.hpp"
+#include "model/filter/in_order.hpp"
 
 namespace wheelwright::filter {
 namespace {

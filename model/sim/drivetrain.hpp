@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "model/robot.hpp"
-#include "sim/plant.hpp"
+#include "model/sim/plant.hpp"
 
 namespace wheelwright::sim {
 

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "filter/measurement.hpp"
-#include "filter/regressor_filter.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/regressor_filter.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::filter {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/regression.hpp"
-#include "filter/element_filter.hpp"
+#include "model/filter/element_filter.hpp"
 
 namespace wheelwright::filter {
 

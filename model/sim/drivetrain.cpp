@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sim/drivetrain.hpp"
+#include "model/sim/drivetrain.hpp"
 
 #include <algorithm>
 #include <cmath>
