@@ -12,7 +12,7 @@
 #include "app/options.hpp"
 #include "app/sound_log.hpp"
 #include "core/error.hpp"
-#include "inference/identification.hpp"
+#include "identify/inference/identification.hpp"
 #include "report/identify_report.hpp"
 #include "results/identification_json.hpp"
 #include "robots/robot_file.hpp"

@@ -21,7 +21,7 @@
 #include "app/sound_log.hpp"
 #include "core/error.hpp"
 #include "doctor/log_health.hpp"
-#include "inference/kinematic_calibration.hpp"
+#include "identify/inference/kinematic_calibration.hpp"
 #include "logs/bag.hpp"
 #include "model/model.hpp"
 #include "robots/controller_file.hpp"

@@ -13,7 +13,7 @@
 #include "core/error.hpp"
 #include "core/statistics.hpp"
 #include "doctor/log_health.hpp"
-#include "inference/identifiability.hpp"
+#include "identify/inference/identifiability.hpp"
 
 namespace wheelwright::doctor {
 namespace {

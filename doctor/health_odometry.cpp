@@ -15,7 +15,7 @@
 #include "core/error.hpp"
 #include "core/statistics.hpp"
 #include "doctor/log_health.hpp"
-#include "inference/kinematic_calibration.hpp"
+#include "identify/inference/kinematic_calibration.hpp"
 
 namespace wheelwright::doctor {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "core/error.hpp"
 #include "doctor/log_health.hpp"
+#include "identify/inference/noise_levels.hpp"
 #include "identify/noise_level.hpp"
-#include "inference/noise_levels.hpp"
 #include "model/filter/encoder.hpp"
 
 namespace wheelwright::doctor {

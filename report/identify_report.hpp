@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "inference/identification.hpp"
+#include "identify/inference/identification.hpp"
 #include "report/page.hpp"
 
 namespace wheelwright::report {

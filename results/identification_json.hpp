@@ -8,7 +8,7 @@
 
 #include "files/json.hpp"
 #include "identify/estimate.hpp"
-#include "inference/identification.hpp"
+#include "identify/inference/identification.hpp"
 #include "logs/recorded_log.hpp"
 
 namespace wheelwright::results {

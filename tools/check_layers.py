@@ -30,7 +30,7 @@ LAYERS = [
     }),
     ("commissioning", {
         "identify": "identify",
-        "inference": "inference",
+        "inference": "identify/inference",
         "commission": "commission",
         "doctor": "doctor",
     }),
@@ -315,7 +315,7 @@ def self_test():
         "@bounds/b.hpp": head + '#include "@core/a.hpp"\nstruct A;\nstruct B {};\nstruct B<2> {};\n',
         "@model/m.hpp": head + "namespace wheelwright::model {\nint f();\n}\n\nnamespace wheelwright {\nusing model::f;\n}\n",
         "@files/c.cpp": spdx + '#include <fstream>\n#include "@core/a.hpp"\n',
-        "@inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
+        "@identify/inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
         "@study/work_on_ranks.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
         "@detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
         "@model/filter/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "commission/physical.hpp"
-#include "inference/identification.hpp"
+#include "identify/inference/identification.hpp"
 
 namespace wheelwright::words {
 

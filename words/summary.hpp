@@ -18,7 +18,7 @@
 #include "doctor/log_health.hpp"
 #include "gap/diagnosis.hpp"
 #include "gap/discrimination_design.hpp"
-#include "inference/identification.hpp"
+#include "identify/inference/identification.hpp"
 #include "study/bound_derivatives.hpp"
 #include "study/fleet_result.hpp"
 #include "study/study.hpp"

@@ -12,7 +12,7 @@
 #include "commission/contradictions.hpp"
 #include "commission/detector_walk.hpp"
 #include "core/error.hpp"
-#include "inference/identification.hpp"
+#include "identify/inference/identification.hpp"
 #include "logs/csv.hpp"
 #include "robots/robot_file.hpp"
 #include "tests/support/skip.hpp"

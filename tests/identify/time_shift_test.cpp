@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
+#include "identify/inference/identification.hpp"
 #include "identify/time_shift.hpp"
-#include "inference/identification.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/rows.hpp"

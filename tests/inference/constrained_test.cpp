@@ -9,7 +9,7 @@
 #include <Eigen/QR>
 
 #include "core/error.hpp"
-#include "inference/constrained.hpp"
+#include "identify/inference/constrained.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/rows.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "inference/noise_levels.hpp"
+#include "identify/inference/noise_levels.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "inference/identification.hpp"
+#include "identify/inference/identification.hpp"
 #include "tests/support/drives.hpp"
 #include "words/identification_words.hpp"
 

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "inference/kinematic_calibration.hpp"
+#include "identify/inference/kinematic_calibration.hpp"
 #include "logs/csv.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/skip.hpp"

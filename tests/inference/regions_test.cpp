@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "inference/regions.hpp"
+#include "identify/inference/regions.hpp"
 #include "core/statistics.hpp"
 
 #include <gtest/gtest.h>

@@ -10,8 +10,8 @@
 #include <boost/math/distributions/students_t.hpp>
 
 #include "core/error.hpp"
-#include "inference/constrained.hpp"
-#include "inference/robust.hpp"
+#include "identify/inference/constrained.hpp"
+#include "identify/inference/robust.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/rows.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/statistics.hpp"
-#include "inference/regions.hpp"
+#include "identify/inference/regions.hpp"
 
 #include <cmath>
 #include <functional>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "inference/constrained.hpp"
+#include "identify/inference/constrained.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -16,8 +16,8 @@
 #include <Eigen/Core>
 
 #include "identify/estimate.hpp"
+#include "identify/inference/block_bootstrap.hpp"
 #include "identify/moments.hpp"
-#include "inference/block_bootstrap.hpp"
 
 namespace wheelwright::inference {
 

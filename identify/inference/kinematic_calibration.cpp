@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "inference/kinematic_calibration.hpp"
+#include "identify/inference/kinematic_calibration.hpp"
 
 #include <algorithm>
 #include <array>

@@ -16,12 +16,12 @@
 #include "commission/setting.hpp"
 #include "core/interval.hpp"
 #include "core/log.hpp"
+#include "identify/inference/identifiability.hpp"
+#include "identify/inference/kinematic_calibration.hpp"
+#include "identify/inference/noise_levels.hpp"
+#include "identify/inference/regions.hpp"
+#include "identify/inference/robust.hpp"
 #include "identify/variable_projection.hpp"
-#include "inference/identifiability.hpp"
-#include "inference/kinematic_calibration.hpp"
-#include "inference/noise_levels.hpp"
-#include "inference/regions.hpp"
-#include "inference/robust.hpp"
 #include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::inference {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "inference/robust.hpp"
+#include "identify/inference/robust.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "inference/regions.hpp"
+#include "identify/inference/regions.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,8 +13,8 @@
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
+#include "identify/inference/block_bootstrap.hpp"
 #include "identify/noise_level.hpp"
-#include "inference/block_bootstrap.hpp"
 
 namespace wheelwright::inference {
 namespace {

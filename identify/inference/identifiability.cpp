@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "inference/identifiability.hpp"
+#include "identify/inference/identifiability.hpp"
 
 #include <algorithm>
 #include <cmath>

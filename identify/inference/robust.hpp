@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 
 #include "core/regression.hpp"
-#include "inference/constrained.hpp"
+#include "identify/inference/constrained.hpp"
 
 namespace wheelwright::inference {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "inference/block_bootstrap.hpp"
+#include "identify/inference/block_bootstrap.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "inference/identification.hpp"
+#include "identify/inference/identification.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,9 +14,9 @@
 #include "core/check.hpp"
 #include "core/error.hpp"
 #include "core/linear_algebra.hpp"
+#include "identify/inference/constrained.hpp"
 #include "identify/noise_level.hpp"
 #include "identify/time_shift.hpp"
-#include "inference/constrained.hpp"
 
 namespace wheelwright::inference {
 namespace {
