@@ -9,7 +9,7 @@
 #include "app/common.hpp"
 #include "app/options.hpp"
 #include "commission/risk_watch.hpp"
-#include "export/export_c.hpp"
+#include "detector/export/export_c.hpp"
 #include "files/bytes.hpp"
 #include "results/model_file.hpp"
 #include "results/model_json.hpp"

@@ -15,7 +15,7 @@
 #include "bounds/support_table.hpp"
 #include "core/error.hpp"
 #include "detector/detector.hpp"
-#include "export/export_c.hpp"
+#include "detector/export/export_c.hpp"
 #include "model/filter/measurement.hpp"
 #include "model/filter/row_stream.hpp"
 #include "model/sim/simulation.hpp"

@@ -32,9 +32,9 @@
 
 #include "bench/compiled_c.hpp"
 #include "core/error.hpp"
+#include "detector/export/export_c.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 #include "detector/online_model.hpp"
-#include "detector/scale_detector.hpp"
-#include "export/export_c.hpp"
 #include "logs/csv.hpp"
 #include "robots/online_model_file.hpp"
 

@@ -31,7 +31,7 @@
 #include "bench/limit/consistency.hpp"
 #include "commission/commission.hpp"
 #include "core/error.hpp"
-#include "detector/margins.hpp"
+#include "detector/faults/margins.hpp"
 #include "logs/csv.hpp"
 #include "model/sim/simulation.hpp"
 #include "robots/robot_file.hpp"

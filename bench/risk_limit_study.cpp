@@ -25,7 +25,7 @@
 #include "bench/limit/likelihood.hpp"
 #include "bench/peers/field.hpp"
 #include "core/error.hpp"
-#include "detector/scale_detector.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 #include "model/sim/simulation.hpp"
 
 using namespace wheelwright;

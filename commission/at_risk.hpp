@@ -7,7 +7,7 @@
 #include <string>
 
 #include "commission/commission.hpp"
-#include "detector/scale_detector.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 
 namespace wheelwright::commission {
 

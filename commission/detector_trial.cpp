@@ -13,8 +13,8 @@
 #include "core/error.hpp"
 #include "core/limits.hpp"
 #include "core/statistics.hpp"
-#include "detector/margins.hpp"
-#include "detector/sum_margins.hpp"
+#include "detector/faults/margins.hpp"
+#include "detector/multiscale/sum_margins.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -58,7 +58,7 @@ struct StatedSizes {
 };
 
 /// One stated fault on one side: for every noise within its bounds, and where the model says something at a stated
-/// risk, by sums over scales (detector/sum_margins.hpp).
+/// risk, by sums over scales (detector/multiscale/sum_margins.hpp).
 struct StatedMargin : StatedSizes {
   std::string fault;
   std::string unit;

@@ -12,8 +12,8 @@
 #include "commission/commission.hpp"
 #include "core/log.hpp"
 #include "detector/detector.hpp"
-#include "detector/isolation.hpp"
-#include "detector/sum_isolation.hpp"
+#include "detector/faults/isolation.hpp"
+#include "detector/multiscale/sum_isolation.hpp"
 
 namespace wheelwright::commission {
 

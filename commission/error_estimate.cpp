@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "commission/noise_budget.hpp"
-#include "detector/scale_detector.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -11,9 +11,9 @@
 #include "core/check.hpp"
 #include "core/error.hpp"
 #include "core/for_all.hpp"
-#include "detector/odometry_faults.hpp"
-#include "detector/pose_margins.hpp"
-#include "detector/smallest_certain.hpp"
+#include "detector/faults/odometry_faults.hpp"
+#include "detector/faults/smallest_certain.hpp"
+#include "detector/multiscale/pose_margins.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "commission/commission.hpp"
 #include "core/log.hpp"
-#include "detector/margins.hpp"
-#include "detector/sum_margins.hpp"
+#include "detector/faults/margins.hpp"
+#include "detector/multiscale/sum_margins.hpp"
 
 namespace wheelwright::commission {
 

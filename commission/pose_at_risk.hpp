@@ -9,7 +9,7 @@
 
 #include "commission/commission.hpp"
 #include "core/regression.hpp"
-#include "detector/pose_sums.hpp"
+#include "detector/multiscale/pose_sums.hpp"
 
 namespace wheelwright::commission {
 

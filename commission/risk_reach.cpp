@@ -9,7 +9,7 @@
 
 #include "commission/physical.hpp"
 #include "core/limits.hpp"
-#include "detector/sum_margins.hpp"
+#include "detector/multiscale/sum_margins.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "detector/scale_detector.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 
 namespace wheelwright::commission {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "detector/pose_sums.hpp"
-#include "detector/scale_detector.hpp"
+#include "detector/multiscale/pose_sums.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 
 namespace wheelwright::commission {
 

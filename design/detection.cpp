@@ -10,7 +10,7 @@
 #include "core/limits.hpp"
 #include "design/risk_promise.hpp"
 #include "detector/events.hpp"
-#include "detector/fault_margin.hpp"
+#include "detector/faults/fault_margin.hpp"
 
 namespace wheelwright::design {
 

@@ -10,8 +10,8 @@
 #include "commission/risk_set.hpp"
 #include "core/check.hpp"
 #include "core/limits.hpp"
-#include "detector/fault_margin.hpp"
-#include "detector/sum_response.hpp"
+#include "detector/faults/fault_margin.hpp"
+#include "detector/multiscale/sum_response.hpp"
 #include "model/filter/motion_bound.hpp"
 #include "model/filter/row_stream.hpp"
 

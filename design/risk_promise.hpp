@@ -9,7 +9,7 @@
 /// wide as any, and it is what is promised: as for the guaranteed bounds (plan.hpp), and by the code of commissioning.
 ///
 /// **Faults.** The sums of the detector at a stated risk along the planned log, with weights, V, radii and what the set
-/// leaves open as on a drive (detector/sum_response.hpp); looks allow for any log that the sensors may write of it. The
+/// leaves open as on a drive (detector/multiscale/sum_response.hpp); looks allow for any log that the sensors may write of it. The
 /// fault is there from before the plan begins, so that it has no onset and no jump.
 #pragma once
 

@@ -11,7 +11,7 @@
 #include "commission/commission.hpp"
 #include "core/regression.hpp"
 #include "core/warrant.hpp"
-#include "detector/reference_motion.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "model/filter/error_class.hpp"
 #include "model/robot.hpp"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "detector/events.hpp"
-#include "detector/isolation.hpp"
+#include "detector/faults/isolation.hpp"
 
 namespace wheelwright::detector {
 

@@ -11,7 +11,7 @@
 #include "commission/model_comparison.hpp"
 #include "commission/risk_watch.hpp"
 #include "core/check.hpp"
-#include "export/export_c.hpp"
+#include "detector/export/export_c.hpp"
 #include "files/bytes.hpp"
 #include "python/module.hpp"
 #include "results/check_words.hpp"

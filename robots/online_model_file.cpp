@@ -10,8 +10,8 @@
 
 #include "bounds/polytope.hpp"
 #include "core/error.hpp"
-#include "detector/pose_sums.hpp"
-#include "detector/scale_detector.hpp"
+#include "detector/multiscale/pose_sums.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 #include "files/bytes.hpp"
 #include "model/robot.hpp"
 #include "robots/robot_file.hpp"

@@ -42,7 +42,7 @@ LAYERS = [
     ("answers", {
         "words": "words",
         "results": "results",
-        "export": "export",
+        "export": "detector/export",
         "report": "report",
     }),
     ("programs", {

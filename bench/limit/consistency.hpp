@@ -53,7 +53,7 @@
 #include "bench/limit/raw_equations.hpp"
 #include "bench/limit/separation.hpp"
 #include "bounds/polytope.hpp"
-#include "detector/reference_motion.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "model/fault_type.hpp"
 
 namespace wheelwright::bench {

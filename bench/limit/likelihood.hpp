@@ -20,7 +20,7 @@
 
 #include <Eigen/Core>
 
-#include "detector/reference_motion.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "model/fault_type.hpp"
 #include "model/filter/measurement.hpp"
 #include "model/filter/noise.hpp"

@@ -27,8 +27,8 @@
 #include <Eigen/Core>
 
 #include "core/log.hpp"
-#include "detector/fault_rows.hpp"
-#include "detector/reference_motion.hpp"
+#include "detector/faults/fault_rows.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "model/fault_type.hpp"
 #include "model/filter/measurement.hpp"
 #include "model/filter/noise.hpp"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <string>
 
-#include "detector/margins.hpp"
+#include "detector/faults/margins.hpp"
 #include "identify/least_squares.hpp"
 #include "model/filter/row_stream.hpp"
 

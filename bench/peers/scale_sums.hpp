@@ -4,7 +4,7 @@
 #pragma once
 
 #include "bench/peers/statistic.hpp"
-#include "detector/scale_detector.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 
 namespace wheelwright::peers {
 

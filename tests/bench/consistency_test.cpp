@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "bench/limit/consistency.hpp"
-#include "detector/margins.hpp"
+#include "detector/faults/margins.hpp"
 #include "tests/detector/detectability.hpp"
 
 namespace wheelwright::bench::consistency_test {

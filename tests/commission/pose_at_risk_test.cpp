@@ -14,7 +14,7 @@
 #include "commission/margin_survey.hpp"
 #include "commission/risk_watch.hpp"
 #include "core/limits.hpp"
-#include "detector/pose_margins.hpp"
+#include "detector/multiscale/pose_margins.hpp"
 #include "model/model.hpp"
 #include "tests/support/kinematic_drives.hpp"
 #include "tests/support/known_unicycle.hpp"

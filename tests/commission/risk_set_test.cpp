@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "detector/scale_detector.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 #include "tests/support/exact_axis.hpp"
 #include "tests/support/most_failures.hpp"
 #include "tests/support/named_axes.hpp"

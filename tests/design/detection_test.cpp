@@ -7,7 +7,7 @@
 
 #include "core/limits.hpp"
 #include "design/detection.hpp"
-#include "detector/fault_rows.hpp"
+#include "detector/faults/fault_rows.hpp"
 #include "model/sim/simulation.hpp"
 #include "tests/design/robots.hpp"
 #include "tests/support/drives.hpp"

@@ -11,8 +11,8 @@
 
 #include "core/limits.hpp"
 #include "design/stages.hpp"
-#include "detector/scale_detector.hpp"
-#include "detector/sum_margins.hpp"
+#include "detector/multiscale/scale_detector.hpp"
+#include "detector/multiscale/sum_margins.hpp"
 #include "model/sim/simulation.hpp"
 #include "tests/design/robots.hpp"
 

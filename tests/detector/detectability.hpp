@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "detector/margins.hpp"
+#include "detector/faults/margins.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/random.hpp"
 

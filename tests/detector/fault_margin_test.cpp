@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/limits.hpp"
-#include "detector/fault_margin.hpp"
+#include "detector/faults/fault_margin.hpp"
 #include "tests/support/random.hpp"
 
 namespace wheelwright::detector::fault_margin_test {

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "detector/fault_rows.hpp"
+#include "detector/faults/fault_rows.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/fault_oracle.hpp"
 

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "commission/detector_walk.hpp"
-#include "detector/isolation.hpp"
+#include "detector/faults/isolation.hpp"
 #include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::isolation_test {

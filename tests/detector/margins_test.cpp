@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/limits.hpp"
-#include "detector/margins.hpp"
+#include "detector/faults/margins.hpp"
 #include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::margins_test {

@@ -8,8 +8,8 @@
 
 #include "commission/kinematic.hpp"
 #include "core/limits.hpp"
-#include "detector/margins.hpp"
-#include "detector/odometry_faults.hpp"
+#include "detector/faults/margins.hpp"
+#include "detector/faults/odometry_faults.hpp"
 #include "tests/detector/detectability.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/random.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sizes that the sums of a pose are said to show, put into a robot that rolls in closed form, with other parameters of
 // the set and other errors than those of the log that was asked.
-#include "detector/pose_margins.hpp"
+#include "detector/multiscale/pose_margins.hpp"
 
 #include <algorithm>
 #include <cmath>

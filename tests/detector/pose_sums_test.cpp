@@ -2,7 +2,7 @@
 // Sums of what odometry leaves of a pose, on a robot that rolls in closed form, under the worst laws of errors that the
 // assumption allows. Risks are large here, so that a promise that is broken would show; SlowPoseSums has thousands of
 // runs.
-#include "detector/pose_sums.hpp"
+#include "detector/multiscale/pose_sums.hpp"
 
 #include <cmath>
 #include <iostream>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "detector/scale_detector.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 
 #include <algorithm>
 #include <cmath>

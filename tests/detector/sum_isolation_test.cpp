@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "commission/detector_walk.hpp"
-#include "detector/sum_isolation.hpp"
+#include "detector/multiscale/sum_isolation.hpp"
 #include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::sum_isolation_test {

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "detector/sum_margins.hpp"
+#include "detector/multiscale/sum_margins.hpp"
 #include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::sum_response_test {

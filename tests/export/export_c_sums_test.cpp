@@ -5,7 +5,7 @@
 
 #include <Eigen/LU>
 
-#include "export/export_c.hpp"
+#include "detector/export/export_c.hpp"
 #include "model/differential_drive.hpp"
 #include "model/filter/motion_bound.hpp"
 #include "model/single_axis.hpp"

@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 
 #include "bounds/slab_rows.hpp"
-#include "export/export_c.hpp"
+#include "detector/export/export_c.hpp"
 #include "model/differential_drive.hpp"
 #include "model/filter/motion_bound.hpp"
 #include "model/robot.hpp"

@@ -15,7 +15,7 @@
 #include "commission/detector_walk.hpp"
 #include "commission/margin_survey.hpp"
 #include "core/regression.hpp"
-#include "detector/isolation.hpp"
+#include "detector/faults/isolation.hpp"
 
 namespace wheelwright::guarantee {
 namespace {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.hpp"
-#include "detector/pose_sums.hpp"
+#include "detector/multiscale/pose_sums.hpp"
 #include "results/model_file.hpp"
 #include "robots/robot_file.hpp"
 #include "tests/support/kinematic_drives.hpp"

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "detector/pose_sums.hpp"
+#include "detector/multiscale/pose_sums.hpp"
 #include "tests/support/exact_unicycle.hpp"
 
 namespace wheelwright::testing_support {

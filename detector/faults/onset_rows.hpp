@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Rows for a fault whose onset lies somewhere in an interval of time, from the motion of the faulty log itself.
+///
+/// A log's motion is the healthy encoders', measured: v + n. With the signature filtered from it, from the instant t_s
+/// on (fault_rows.hpp), a row at t > t_s reads, for a fault that set in at any T in [t_a, t_b], t_b < t_s,
+///
+///     τ_f = (y + κ g1 + κ² g2) θ + κ c + α² (e^{−βx} A + x e^{−βx} B + e^{−γx} C) + e,     x = t − t_s,
+///
+/// (order 1: α e^{−βx} A): the filter is linear, so what happened in [T, t_s] lives on in its state at t_s alone
+/// (kernel.hpp). A, B and C, for each output, are that state beyond the one of an onset at t_s itself. They are bounded
+/// by what onsets at the instants of [t_a, t_s] leave there, times kTransition: that is what covers a step between two
+/// samples, whose interval mixes both sides.
+///
+/// Errors |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c: SignatureErrors. Where motion between samples counts, Δ is
+/// the row's own dY, from the efforts as they were logged: a faulty robot's motion may be what they say, or what they
+/// say less the offset that the fault adds (effort_dY, effort_doubt).
+///
+/// A drift s = (t − T)/rise is a mixture of steps; that T is known to t_s − t_a only adds (t_s − t_a)/rise of the
+/// step's signature to e1 and e_c, and twice that to e2.
+///
+/// A fault of the encoders shows (I + κ s S) v: then v = (I − κ' s S) v_seen, κ' = κ/(1 + κ), where S² = S. It is a
+/// fault of motion with K = −S in κ'.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "detector/faults/fault_rows.hpp"
+
+namespace wheelwright::detector {
+
+/// One output at one instant under a hypothesis.
+struct OnsetRow {
+  Eigen::RowVectorXd e0;              ///< p entries: |δ| is larger by this, whatever κ
+  Eigen::RowVectorXd g1, g2, e1, e2;  ///< p entries
+  double c = 0.0, ec = 0.0;
+  std::array<double, 3> left{};  ///< weights of A, B and C
+};
+
+/// A fault of the encoders alone as a fault of motion, in κ' = κ/(1 + κ), of what they show; its range is in κ' too.
+[[nodiscard]] FaultType as_motion_of_reading(const FaultType& fault);
+
+/// Rows of one fault for one onset interval after the other.
+class OnsetRows {
+ public:
+  /// Times the states that onsets between two samples may leave.
+  static constexpr double kTransition = 2.0;
+
+  /// True if the fault's rows are known: a step or a drift whose S, if any, has S² = S and comes alone, that does not
+  /// stand for a reading that stands still, and whose signature is a polynomial of κ (polynomial()).
+  [[nodiscard]] static bool knows(const FaultType& fault, const Model& model);
+
+  /// For the instants [first, end) of `motion`, of one segment. References are kept.
+  OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion,
+            std::size_t first, std::size_t end);
+
+  /// The onset lies between instants `a` and `b` > a, b + 1 < end. Rows before `a` are healthy, rows of instants in
+  /// [a, b + 1] are not spoken of.
+  void between(std::size_t a, std::size_t b);
+  /// The instant of t_s, b + 1.
+  [[nodiscard]] std::size_t start() const { return s_; }
+  /// Row of output `i` at instant k > start().
+  [[nodiscard]] OnsetRow row(std::size_t k, std::size_t i);
+  /// |A|, |B| and |C| of output `i` are at most this for |θ_j| <= largest_j and |κ| <= `kappa`.
+  [[nodiscard]] std::array<double, 3> left_bounds(std::size_t i, double kappa, const Eigen::VectorXd& largest) const;
+  /// The same of an effort that was never larger than `effort` before t_s.
+  [[nodiscard]] std::array<double, 3> left_bounds(double effort) const;
+
+  /// True if κ of the rows is κ' of a fault of the encoders.
+  [[nodiscard]] bool encoder() const { return encoder_; }
+
+ private:
+  struct State {
+    FaultSignals z1, z2, fast;  // KernelState, entry by entry
+  };
+  [[nodiscard]] core::RowMatrix jump(std::size_t k) const;
+  [[nodiscard]] State left(std::size_t from, std::size_t at) const;
+  [[nodiscard]] FaultSignals filtered(std::size_t k) const;
+  [[nodiscard]] double way(std::size_t from, std::size_t to) const { return way_[to - first_] - way_[from - first_]; }
+  void take(const FaultType& fault);
+
+  FaultType fault_, step_;
+  const Model* model_;
+  FilterDesign design_;
+  filter::FilterKernel kernel_;
+  SignatureErrors errors_;
+  bool encoder_;
+  const ReferenceMotion* motion_;
+  std::size_t first_, end_, s_ = 0;
+  double gain_, uncertain_ = 0.0;       // α^order; share of a drift that the onset leaves open
+  std::vector<double> way_;             // s of steps from first_ to each instant, as the filter counts them
+  std::vector<State> state_;            // of an onset at first_, per instant
+  std::vector<FaultSignals> drifting_;  // filtered, of a drift from s_ on
+  State bound_;                         // entry by entry
+};
+
+}  // namespace wheelwright::detector
