@@ -11,7 +11,7 @@
 #include "app/commands.hpp"
 #include "app/common.hpp"
 #include "app/options.hpp"
-#include "commission/detector_choice.hpp"
+#include "commission/choice/detector_choice.hpp"
 #include "core/error.hpp"
 #include "report/choice_report.hpp"
 #include "results/detection_json.hpp"

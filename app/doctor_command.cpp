@@ -9,7 +9,7 @@
 #include "app/commands.hpp"
 #include "app/common.hpp"
 #include "app/options.hpp"
-#include "doctor/log_health.hpp"
+#include "commission/doctor/log_health.hpp"
 #include "report/health_report.hpp"
 #include "results/health_json.hpp"
 #include "robots/robot_file.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/drive_files.hpp"
 
-#include "design/plan.hpp"
+#include "commission/design/plan.hpp"
 #include "logs/csv.hpp"
 #include "logs/velocity_commands.hpp"
 

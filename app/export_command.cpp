@@ -8,7 +8,7 @@
 #include "app/commands.hpp"
 #include "app/common.hpp"
 #include "app/options.hpp"
-#include "commission/risk_watch.hpp"
+#include "commission/watch/risk_watch.hpp"
 #include "detector/export/export_c.hpp"
 #include "files/bytes.hpp"
 #include "results/model_file.hpp"

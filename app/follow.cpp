@@ -22,9 +22,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "commission/blind_watch.hpp"
-#include "commission/incident_watch.hpp"
-#include "commission/risk_watch.hpp"
+#include "commission/watch/blind_watch.hpp"
+#include "commission/watch/incident_watch.hpp"
+#include "commission/watch/risk_watch.hpp"
 #include "files/bytes.hpp"
 #include "files/temporary.hpp"
 #include "files/words.hpp"

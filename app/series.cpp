@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "app/common.hpp"
-#include "commission/detector_walk.hpp"
 #include "commission/physical.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/limits.hpp"
 #include "files/json.hpp"
 #include "logs/log_file.hpp"

@@ -18,7 +18,7 @@
 
 #include "bounds/minimax.hpp"
 #include "commission/commission.hpp"
-#include "commission/detector_walk.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
 #include "logs/csv.hpp"
 #include "model/filter/row_stream.hpp"

@@ -22,7 +22,7 @@
 
 #include "bench/bench.hpp"
 #include "commission/commission.hpp"
-#include "commission/detector_walk.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
 #include "identify/least_squares.hpp"
 #include "logs/csv.hpp"

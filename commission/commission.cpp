@@ -10,10 +10,10 @@
 #include <fmt/format.h>
 
 #include "bounds/feasible_set.hpp"
-#include "commission/at_risk.hpp"
+#include "commission/at_risk/at_risk.hpp"
+#include "commission/at_risk/pose_at_risk.hpp"
 #include "commission/contradictions.hpp"
 #include "commission/fit.hpp"
-#include "commission/pose_at_risk.hpp"
 #include "commission/setting.hpp"
 #include "commission/two_walks.hpp"
 #include "core/check.hpp"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <memory>
 
-#include "commission/risk_reach.hpp"
-#include "commission/risk_watch.hpp"
+#include "commission/at_risk/risk_reach.hpp"
+#include "commission/watch/risk_watch.hpp"
 #include "core/check.hpp"
 #include "core/error.hpp"
 #include "core/for_all.hpp"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "bounds/box.hpp"
-#include "commission/filter_choice.hpp"
+#include "commission/choice/filter_choice.hpp"
 #include "commission/survey.hpp"
 #include "commission/validation.hpp"
 #include "core/log.hpp"

@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
-#include <wheelwright/commission/detector_walk.hpp>
 #include <wheelwright/commission/physical.hpp>
+#include <wheelwright/commission/watch/detector_walk.hpp>
 #include <wheelwright/model/sim/simulation.hpp>
 #include <wheelwright/results/scenario_file.hpp>
 

@@ -30,7 +30,7 @@
 #include <string>
 #include <vector>
 
-#include "design/subject.hpp"
+#include "commission/design/subject.hpp"
 #include "gap/drive.hpp"
 #include "gap/effect.hpp"
 #include "gap/gap_rows.hpp"

@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "commission/design/stages.hpp"
 #include "core/check.hpp"
 #include "core/error.hpp"
 #include "core/random.hpp"
-#include "design/stages.hpp"
 #include "gap/effort_units.hpp"
 #include "gap/further_drive.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "design/manoeuvre.hpp"
+#include "commission/design/manoeuvre.hpp"
 #include "gap/discrimination.hpp"
 
 namespace wheelwright::gap {

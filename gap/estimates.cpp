@@ -9,9 +9,9 @@
 #include <string>
 #include <utility>
 
+#include "commission/design/stages.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
-#include "design/stages.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
+#include "commission/design/stages.hpp"
 #include "core/check.hpp"
 #include "core/error.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/random.hpp"
 #include "core/words.hpp"
-#include "design/stages.hpp"
 #include "gap/discrimination_design.hpp"
 #include "gap/estimates.hpp"
 #include "gap/prepared.hpp"

@@ -10,9 +10,9 @@
 
 #include <Eigen/Core>
 
+#include "commission/design/plan.hpp"
+#include "commission/design/subject.hpp"
 #include "core/log.hpp"
-#include "design/plan.hpp"
-#include "design/subject.hpp"
 #include "gap/block_gram.hpp"
 #include "gap/candidate.hpp"
 #include "gap/confusion.hpp"

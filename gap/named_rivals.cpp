@@ -5,8 +5,8 @@
 #include <set>
 #include <utility>
 
+#include "commission/design/stages.hpp"
 #include "core/error.hpp"
-#include "design/stages.hpp"
 #include "gap/further_drive.hpp"
 
 namespace wheelwright::gap {

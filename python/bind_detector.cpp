@@ -8,8 +8,8 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include "commission/detector_walk.hpp"
 #include "commission/margin_survey.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/check.hpp"
 #include "python/arrays.hpp"
 #include "python/module.hpp"

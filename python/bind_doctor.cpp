@@ -7,9 +7,9 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include "commission/detector_choice.hpp"
+#include "commission/choice/detector_choice.hpp"
 #include "commission/model_comparison.hpp"
-#include "commission/risk_watch.hpp"
+#include "commission/watch/risk_watch.hpp"
 #include "core/check.hpp"
 #include "detector/export/export_c.hpp"
 #include "files/bytes.hpp"

@@ -8,10 +8,10 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
+#include "commission/design/detection.hpp"
+#include "commission/design/manoeuvre.hpp"
+#include "commission/design/stages.hpp"
 #include "core/check.hpp"
-#include "design/detection.hpp"
-#include "design/manoeuvre.hpp"
-#include "design/stages.hpp"
 #include "gap/discrimination_design.hpp"
 #include "gap/effect.hpp"
 #include "gap/named_rivals.hpp"

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "commission/detector_choice.hpp"
+#include "commission/choice/detector_choice.hpp"
 #include "report/page.hpp"
 
 namespace wheelwright::report {

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "commission/physical.hpp"
-#include "commission/risk_watch.hpp"
+#include "commission/watch/risk_watch.hpp"
 #include "report/drawing.hpp"
 #include "report/page.hpp"
 #include "words/detect_words.hpp"

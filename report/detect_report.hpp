@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "commission/commission.hpp"
-#include "commission/detector_walk.hpp"
-#include "commission/incident_watch.hpp"
 #include "commission/margin_survey.hpp"
-#include "commission/risk_watch.hpp"
+#include "commission/watch/detector_walk.hpp"
+#include "commission/watch/incident_watch.hpp"
+#include "commission/watch/risk_watch.hpp"
 #include "report/page.hpp"
 
 namespace wheelwright::report {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "commission/choice/filter_choice.hpp"
 #include "commission/commission.hpp"
-#include "commission/filter_choice.hpp"
 #include "core/limits.hpp"
 #include "core/log.hpp"
 #include "report/sections.hpp"

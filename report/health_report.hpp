@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "doctor/log_health.hpp"
+#include "commission/doctor/log_health.hpp"
 #include "report/page.hpp"
 
 namespace wheelwright::report {

@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "commission/detector_walk.hpp"
 #include "commission/margin_survey.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/log.hpp"
 #include "core/warrant.hpp"
 #include "words/text.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "commission/detector_walk.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/log.hpp"
 #include "model/robot.hpp"
 #include "report/page.hpp"

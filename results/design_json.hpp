@@ -5,8 +5,8 @@
 
 #include <string>
 
-#include "design/detection.hpp"
-#include "design/manoeuvre.hpp"
+#include "commission/design/detection.hpp"
+#include "commission/design/manoeuvre.hpp"
 #include "files/json.hpp"
 #include "gap/discrimination_design.hpp"
 

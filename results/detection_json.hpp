@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "commission/blind_watch.hpp"
-#include "commission/detector_choice.hpp"
-#include "commission/detector_walk.hpp"
-#include "commission/incident_watch.hpp"
+#include "commission/choice/detector_choice.hpp"
 #include "commission/margin_survey.hpp"
-#include "commission/risk_watch.hpp"
+#include "commission/watch/blind_watch.hpp"
+#include "commission/watch/detector_walk.hpp"
+#include "commission/watch/incident_watch.hpp"
+#include "commission/watch/risk_watch.hpp"
 #include "files/json.hpp"
 
 namespace wheelwright::results {

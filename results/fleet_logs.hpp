@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "doctor/log_health.hpp"
+#include "commission/doctor/log_health.hpp"
 #include "logs/log_file.hpp"
 #include "model/robot.hpp"
 #include "robots/fleet_list.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "doctor/log_health.hpp"
+#include "commission/doctor/log_health.hpp"
 #include "files/json.hpp"
 #include "logs/recorded_log.hpp"
 

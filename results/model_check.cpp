@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "commission/at_risk/pose_at_risk.hpp"
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
-#include "commission/pose_at_risk.hpp"
 #include "model/filter/row_stream.hpp"
 #include "results/model_json.hpp"
 #include "results/risk_check.hpp"

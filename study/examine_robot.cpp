@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "commission/detector_walk.hpp"
 #include "commission/physical.hpp"
+#include "commission/watch/detector_walk.hpp"
 
 namespace wheelwright::study {
 namespace {

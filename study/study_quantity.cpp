@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "commission/commission.hpp"
-#include "commission/detector_walk.hpp"
 #include "commission/margin_survey.hpp"
 #include "commission/physical.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
 #include "core/limits.hpp"
 #include "core/words.hpp"

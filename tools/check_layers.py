@@ -32,10 +32,10 @@ LAYERS = [
         "identify": "identify",
         "inference": "identify/inference",
         "commission": "commission",
-        "doctor": "doctor",
+        "doctor": "commission/doctor",
     }),
     ("studies", {
-        "design": "design",
+        "design": "commission/design",
         "gap": "gap",
         "study": "study",
     }),

@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "commission/at_risk.hpp"
+#include "commission/at_risk/at_risk.hpp"
+#include "commission/at_risk/pose_at_risk.hpp"
 #include "commission/physical.hpp"
-#include "commission/pose_at_risk.hpp"
 #include "core/statistics.hpp"
 #include "words/detect_words.hpp"
 #include "words/text.hpp"

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "commission/detector_choice.hpp"
-#include "commission/detector_walk.hpp"
-#include "commission/incident_watch.hpp"
+#include "commission/choice/detector_choice.hpp"
 #include "commission/margin_survey.hpp"
+#include "commission/watch/detector_walk.hpp"
+#include "commission/watch/incident_watch.hpp"
 #include "words/text.hpp"
 
 namespace wheelwright::words {

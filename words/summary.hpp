@@ -7,15 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "commission/blind_watch.hpp"
+#include "commission/choice/detector_choice.hpp"
 #include "commission/commission.hpp"
-#include "commission/detector_choice.hpp"
-#include "commission/detector_walk.hpp"
-#include "commission/incident_watch.hpp"
-#include "commission/risk_watch.hpp"
-#include "design/detection.hpp"
-#include "design/manoeuvre.hpp"
-#include "doctor/log_health.hpp"
+#include "commission/design/detection.hpp"
+#include "commission/design/manoeuvre.hpp"
+#include "commission/doctor/log_health.hpp"
+#include "commission/watch/blind_watch.hpp"
+#include "commission/watch/detector_walk.hpp"
+#include "commission/watch/incident_watch.hpp"
+#include "commission/watch/risk_watch.hpp"
 #include "gap/diagnosis.hpp"
 #include "gap/discrimination_design.hpp"
 #include "identify/inference/identification.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A stream that brings no decisions is told once when it has lasted too long, and once when it is over.
-#include "commission/blind_watch.hpp"
+#include "commission/watch/blind_watch.hpp"
 
 #include <gtest/gtest.h>
 

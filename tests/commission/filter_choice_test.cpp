@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "commission/filter_choice.hpp"
+#include "commission/choice/filter_choice.hpp"
 
 #include <algorithm>
 #include <cmath>

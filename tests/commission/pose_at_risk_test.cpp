@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kinematic residual at a stated risk from log to thresholds, on a robot that rolls in closed form.
-#include "commission/pose_at_risk.hpp"
+#include "commission/at_risk/pose_at_risk.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 
 #include "commission/kinematic.hpp"
 #include "commission/margin_survey.hpp"
-#include "commission/risk_watch.hpp"
+#include "commission/watch/risk_watch.hpp"
 #include "core/limits.hpp"
 #include "detector/multiscale/pose_margins.hpp"
 #include "model/model.hpp"

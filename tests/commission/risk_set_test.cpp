@@ -2,7 +2,7 @@
 // The set and the detector at a stated risk, on an axis solved in closed form under the worst laws of errors that the
 // assumptions allow. Risks are large here, so that a few hundred runs would show a promise that is broken; the campaign
 // (SlowAtRisk) has the runs that the promise is stated for.
-#include "commission/at_risk.hpp"
+#include "commission/at_risk/at_risk.hpp"
 
 #include <cmath>
 #include <iostream>

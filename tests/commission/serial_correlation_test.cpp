@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "commission/at_risk.hpp"
+#include "commission/at_risk/at_risk.hpp"
 #include "tests/support/exact_axis.hpp"
 #include "tests/support/most_failures.hpp"
 #include "tests/support/named_axes.hpp"

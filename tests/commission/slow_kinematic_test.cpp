@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "commission/commission.hpp"
-#include "commission/detector_walk.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::commission::slow_kinematic_test {

@@ -10,7 +10,7 @@
 
 #include "commission/commission.hpp"
 #include "commission/contradictions.hpp"
-#include "commission/detector_walk.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
 #include "identify/inference/identification.hpp"
 #include "logs/csv.hpp"

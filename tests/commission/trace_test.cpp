@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "commission/commission.hpp"
-#include "commission/detector_walk.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
 #include "tests/support/drives.hpp"
 

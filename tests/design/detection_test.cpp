@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "commission/design/detection.hpp"
 #include "core/limits.hpp"
-#include "design/detection.hpp"
 #include "detector/faults/fault_rows.hpp"
 #include "model/sim/simulation.hpp"
 #include "tests/design/robots.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is promised before the drive: closed forms, and that no noise within the bounds makes it wider.
-#include "design/plan.hpp"
+#include "commission/design/plan.hpp"
 
 #include <cmath>
 #include <random>
@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "bounds/interval_hull.hpp"
+#include "commission/design/manoeuvre.hpp"
 #include "core/error.hpp"
-#include "design/manoeuvre.hpp"
 #include "tests/design/robots.hpp"
 
 namespace wheelwright::design::objective_test {

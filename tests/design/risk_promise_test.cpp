@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Promises at a stated risk: what a plan promises against what commissioning and the detector over scales make of a log
 // that was driven along it.
-#include "design/risk_promise.hpp"
+#include "commission/design/risk_promise.hpp"
 
 #include <cmath>
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "commission/design/stages.hpp"
 #include "core/limits.hpp"
-#include "design/stages.hpp"
 #include "detector/multiscale/scale_detector.hpp"
 #include "detector/multiscale/sum_margins.hpp"
 #include "model/sim/simulation.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "design/stages.hpp"
+#include "commission/design/stages.hpp"
 #include "model/robot.hpp"
 #include "model/sim/simulation.hpp"
 

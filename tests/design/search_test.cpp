@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Minima that are known, and that neither threads nor repetition change anything.
-#include "design/stages.hpp"
+#include "commission/design/stages.hpp"
 
 #include <cmath>
 #include <numbers>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A designed manoeuvre against a figure eight: both are driven in simulation, with noise and with parameters that are
 // not the believed ones, and both logs are commissioned.
-#include "design/manoeuvre.hpp"
+#include "commission/design/manoeuvre.hpp"
 
 #include <cmath>
 #include <cstdint>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every point of the cube is a manoeuvre within the limits that retraces its path.
-#include "design/stages.hpp"
+#include "commission/design/stages.hpp"
 
 #include <algorithm>
 #include <cmath>

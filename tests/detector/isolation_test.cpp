@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "commission/detector_walk.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "detector/faults/isolation.hpp"
 #include "tests/detector/detectability.hpp"
 

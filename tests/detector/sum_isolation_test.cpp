@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "commission/detector_walk.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "detector/multiscale/sum_isolation.hpp"
 #include "tests/detector/detectability.hpp"
 

@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "doctor/log_health.hpp"
+#include "commission/doctor/log_health.hpp"
 #include "logs/csv.hpp"
 #include "model/sim/simulation.hpp"
 #include "results/health_json.hpp"

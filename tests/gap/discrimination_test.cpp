@@ -9,8 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include "commission/design/stages.hpp"
 #include "core/error.hpp"
-#include "design/stages.hpp"
 #include "gap/block_gram.hpp"
 #include "gap/discrimination_design.hpp"
 #include "gap/drive.hpp"

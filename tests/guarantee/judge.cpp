@@ -12,8 +12,8 @@
 #include "bounds/feasible_set.hpp"
 #include "commission/assumptions.hpp"
 #include "commission/commission.hpp"
-#include "commission/detector_walk.hpp"
 #include "commission/margin_survey.hpp"
+#include "commission/watch/detector_walk.hpp"
 #include "core/regression.hpp"
 #include "detector/faults/isolation.hpp"
 

@@ -1,0 +1,509 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "commission/contradictions.hpp"
+#include "commission/doctor/log_health.hpp"
+#include "commission/fit.hpp"
+#include "commission/physical.hpp"
+#include "commission/setting.hpp"
+#include "core/error.hpp"
+#include "core/statistics.hpp"
+#include "identify/inference/identifiability.hpp"
+
+namespace wheelwright::doctor {
+namespace {
+
+constexpr double kSome = 0.02;              // share of the rows that makes a manoeuvre count
+constexpr double kTractionSpan = 0.1;       // s to both sides, for an acceleration
+constexpr double kMostTraction = 25.0;      // m/s²: two and a half times that of gravity
+constexpr double kChangedPlaces = 0.15;     // sum of |log| of two ratios to nominal values
+constexpr double kMostTimesNominal = 20.0;  // a robot may carry a load
+constexpr double kLeastTimesNominal = 0.2;  // and loses less
+constexpr double kUnusedRisk = 1e-3;        // for fit_log; not used further
+
+LogFinding about_motion(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
+                        std::string unit) {
+  return {.id = id,
+          .topic = FindingTopic::motion,
+          .severity = severity,
+          .sentence = std::move(sentence),
+          .next = std::move(next),
+          .value = value,
+          .unit = std::move(unit)};
+}
+
+double share_of(const std::vector<double>& values, auto&& test) {
+  return static_cast<double>(std::ranges::count_if(values, test)) / static_cast<double>(values.size());
+}
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) {
+    return 0.0;
+  }
+  const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1));
+  return core::order_statistic(std::move(values), rank);
+}
+
+void one_way(const char* id, const char* what, const char* plus, const char* minus, double p, double m,
+             FindingSeverity severity, std::vector<LogFinding>& out) {
+  if (p > kSome && m > kSome) {
+    out.push_back(about_motion(
+        id, FindingSeverity::fine,
+        fmt::format("{}: {} in {:.0f} %, {} in {:.0f} % of the rows.", what, plus, 100.0 * p, minus, 100.0 * m), "",
+        std::min(p, m), "1"));
+  } else if (p > kSome || m > kSome) {
+    const bool lacks_plus = p <= kSome;
+    out.push_back(about_motion(
+        id, severity,
+        fmt::format("{}: {} in {:.0f} % of the rows, but hardly ever {}.", what, lacks_plus ? minus : plus,
+                    100.0 * std::max(p, m), lacks_plus ? plus : minus),
+        fmt::format("Drive {} too: what differs with the direction is not seen.", lacks_plus ? plus : minus),
+        std::min(p, m), "1"));
+  }
+}
+
+void check_speeds(const std::vector<double>& speeds, double top, const char* unit, std::vector<LogFinding>& out) {
+  std::vector<double> fast;
+  for (const double v : speeds) {
+    if (std::abs(v) > 0.1 * top) {
+      fast.push_back(std::abs(v));
+    }
+  }
+  if (fast.size() < 20) {
+    return;
+  }
+  const double low = quantile(fast, 0.1), high = quantile(fast, 0.9);
+  const bool narrow = high < 1.3 * low;
+  out.push_back(about_motion(
+      "motion.speeds", narrow ? FindingSeverity::notice : FindingSeverity::fine,
+      fmt::format("In motion, four fifths of the speeds are between {:.3g} and {:.3g} {}.", low, high, unit),
+      narrow ? "Drive slowly and fast: one speed cannot tell dry from viscous friction." : "",
+      low > 0.0 ? high / low : 0.0, "1"));
+}
+
+void check_directions(const HealthView& view, std::vector<LogFinding>& out) {
+  if (view.joints.size() == 1) {
+    const JointView& j = view.joints[0];
+    const auto test = [&](double sign) { return share_of(j.smooth, [&](double v) { return sign * v > 0.1 * j.top; }); };
+    one_way("motion.direction", "Direction", "forwards", "backwards", test(1.0), test(-1.0), FindingSeverity::notice,
+            out);
+    check_speeds(j.smooth, j.top, "(unit of the column)", out);
+    return;
+  }
+  if (view.joints.size() != 2) {
+    return;
+  }
+  const double top = std::max(view.joints[0].top, view.joints[1].top);
+  std::vector<double> forward(view.log->rows()), turn(view.log->rows());
+  for (std::size_t k = 0; k < forward.size(); ++k) {
+    forward[k] = 0.5 * (view.joints[0].smooth[k] + view.joints[1].smooth[k]);
+    turn[k] = 0.5 * (view.joints[0].smooth[k] - view.joints[1].smooth[k]);
+  }
+  const auto test = [&](const std::vector<double>& values, double sign) {
+    return share_of(values, [&](double v) { return sign * v > 0.05 * top; });
+  };
+  const double left = test(turn, 1.0), right = test(turn, -1.0);
+  if (left <= kSome && right <= kSome) {
+    out.push_back(about_motion("motion.turning", FindingSeverity::warning, "The robot hardly turns.",
+                               "Drive curves to both sides, with changing yaw rate.", std::max(left, right), "1"));
+  }
+  one_way("motion.turning", "Turning", "to the left", "to the right", left, right, FindingSeverity::warning, out);
+  const double ahead = test(forward, 1.0), back = test(forward, -1.0);
+  if (ahead <= kSome && back <= kSome) {
+    out.push_back(about_motion("motion.direction", FindingSeverity::warning, "The robot hardly drives along.",
+                               "Drive straight, with changing speed.", std::max(ahead, back), "1"));
+  }
+  one_way("motion.direction", "Driving", "forwards", "backwards", ahead, back, FindingSeverity::notice, out);
+  check_speeds(forward, top, "rad/s of the wheels", out);
+}
+
+// Whether another wheel is much faster than `joint`, which may be dragged through a curve then: against its effort.
+bool is_inner(const HealthView& view, const JointView& joint, std::size_t k) {
+  constexpr double kMuchSlower = 0.8;
+  return std::ranges::any_of(view.joints, [&](const JointView& other) {
+    return std::abs(joint.smooth[k]) < kMuchSlower * std::abs(other.smooth[k]);
+  });
+}
+
+// Whether every joint has, in motion, efforts of both signs or speeds of one.
+void check_effort_sense(const HealthView& view, std::vector<LogFinding>& out) {
+  for (const JointView& j : view.joints) {
+    double te = 0.0, ee = 0.0, ww = 0.0, ta = 0.0, aa = 0.0, driven = 0.0;
+    const std::vector<double>& t = view.log->t;
+    for (const auto& [first, last] : view.segments) {
+      for (std::size_t k = first + 5; k + 5 < last; ++k) {
+        const double e = (*j.effort)[k], w = j.smooth[k];
+        const double a = (j.smooth[k + 5] - j.smooth[k - 5]) / (t[k + 5] - t[k - 5]);
+        if (!is_inner(view, j, k)) {
+          te += e * w;
+          ww += w * w;
+          driven += e * e;
+        }
+        ta += e * a;
+        ee += e * e;
+        aa += a * a;
+      }
+    }
+    if (!(ee > 0.0)) {
+      continue;
+    }
+    if (view.one_sided(j) && (!view.robot.effort_unsigned || !view.robot_given)) {
+      out.push_back(
+          {.id = "units.effort_unsigned",
+           .topic = FindingTopic::units,
+           .severity = view.robot_given ? FindingSeverity::fatal : FindingSeverity::notice,
+           .sentence = fmt::format("{} is never negative although its wheel turns both ways: only its size was "
+                                   "logged.",
+                                   j.effort_name),
+           .next = "Write `effort: {…, unsigned: true}` into the robot file, or log the sign.",
+           .columns = {j.effort_name}});
+      continue;
+    }
+    const double power = driven * ww > 0.0 ? te / std::sqrt(driven * ww) : 0.0;
+    const double inertia = aa > 0.0 ? ta / std::sqrt(ee * aa) : 0.0;
+    if (!view.robot.effort_unsigned && ((power < -0.05 && inertia < 0.1) || (inertia < -0.3 && power < 0.05))) {
+      out.push_back({.id = "units.effort_sign",
+                     .topic = FindingTopic::units,
+                     .severity = FindingSeverity::fatal,
+                     .sentence = fmt::format("{} and {} have opposite signs: the effort would brake the wheel that it "
+                                             "drives (correlation with speed {:.2f}, with acceleration {:.2f}).",
+                                             j.effort_name, j.motion_name(), power, inertia),
+                     .next = "Turn the sign of one of them: both count positive when the wheel drives forwards.",
+                     .columns = {j.effort_name, j.motion_name()},
+                     .value = power,
+                     .unit = "1"});
+    }
+  }
+}
+
+struct TorqueUnit {
+  double ratio;
+  const char* unit;
+};
+constexpr TorqueUnit kTorqueUnits[] = {
+    {1000.0, "mN·m"}, {141.6, "ozf·in"}, {100.0, "N·cm"}, {10.197, "kgf·cm"}, {8.851, "lbf·in"}};
+
+// By how much masses come out too small where wheel speeds are in another unit.
+constexpr TorqueUnit kSpeedUnits[] = {{std::numbers::pi / 180.0, "deg/s"}, {std::numbers::pi / 30.0, "rpm"}};
+
+// Accelerations that no tyre holds: the motion is in another unit than rad.
+void check_traction(const HealthView& view, std::vector<LogFinding>& out) {
+  if (!view.robot_given || !model::on_two_wheels(view.robot) || !(view.step > 0.0)) {
+    return;
+  }
+  const auto span = static_cast<std::size_t>(std::max(5.0, std::round(kTractionSpan / view.step)));
+  const std::vector<double>& t = view.log->t;
+  for (const JointView& j : view.joints) {
+    std::vector<double> rim;
+    for (const auto& [first, last] : view.segments) {
+      for (std::size_t k = first + span; k + span < last; ++k) {
+        rim.push_back(view.robot.wheel_radius *
+                      std::abs((j.smooth[k + span] - j.smooth[k - span]) / (t[k + span] - t[k - span])));
+      }
+    }
+    const double high = quantile(std::move(rim), 0.99);
+    if (high > kMostTraction) {
+      out.push_back(
+          {.id = "units.wheel_speed",
+           .topic = FindingTopic::units,
+           .severity = FindingSeverity::fatal,
+           .sentence = fmt::format("By {} and the robot file's radius the rim accelerates at {:.3g} m/s², which "
+                                   "no tyre holds (at {:.3g} m/s): degrees or rpm?",
+                                   j.motion_name(), high, view.robot.wheel_radius * j.top),
+           .next = "Convert the wheels' motion to rad and rad/s at the wheel, or correct wheel_radius.",
+           .columns = {j.motion_name()},
+           .value = high,
+           .unit = "m/s²"});
+      return;
+    }
+  }
+}
+
+// Without a gyro or a pose nothing tells whether one wheel counts backwards, efforts and all: driving and turning then
+// change places. A drive that is mostly turning is told; with nominal values that fit only if they change back, it is
+// wrong.
+void check_mirrored(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
+                    std::vector<LogFinding>& out) {
+  if (view.joints.size() != 2 || view.column("gyro_z") != nullptr || view.column("theta") != nullptr) {
+    return;
+  }
+  double along = 0.0, turn = 0.0;
+  for (std::size_t k = 0; k < view.log->rows(); ++k) {
+    const double right = view.joints[0].smooth[k], left = view.joints[1].smooth[k];
+    along += (right + left) * (right + left);
+    turn += (right - left) * (right - left);
+  }
+  if (!(turn > along)) {
+    return;
+  }
+  const auto scales = commission::physical_scales(s.robot, s.model);
+  const auto found = [&](const char* name) -> std::optional<double> {
+    for (std::size_t j = 0; scales && j < s.model.p(); ++j) {
+      if (s.model.parameters[j].physical == name && fit.excitation[j].state == identify::Excitation::identified) {
+        const double value = (*scales)[j].scale * fit.estimate[static_cast<Eigen::Index>(j)] - (*scales)[j].offset;
+        return value > 0.0 ? std::optional(value) : std::nullopt;
+      }
+    }
+    return std::nullopt;
+  };
+  const auto mass = found("mass"), inertia = found("yaw_inertia");
+  const auto& nominal = s.robot.nominal;
+  bool changed_places = false;
+  if (view.robot_given && mass && inertia && nominal.contains("mass") && nominal.contains("yaw_inertia")) {
+    const double square = 0.25 * s.robot.track_width * s.robot.track_width;
+    const auto off = [&](double m, double i) {
+      return std::abs(std::log(m / nominal.at("mass"))) + std::abs(std::log(i / nominal.at("yaw_inertia")));
+    };
+    changed_places = off(*mass, *inertia) > kChangedPlaces + 2.0 * off(*inertia / square, *mass * square);
+  }
+  out.push_back({.id = "units.wheel_mirrored",
+                 .topic = FindingTopic::units,
+                 .severity = changed_places ? FindingSeverity::fatal : FindingSeverity::warning,
+                 .sentence = fmt::format("As its wheels count, the robot turns on the spot more than it drives ({:.2g} "
+                                         "times as fast){}, and the log has neither gyro nor pose to tell.",
+                                         std::sqrt(turn / along),
+                                         changed_places ? "; mass and yaw inertia fit the robot file if one wheel, its "
+                                                          "effort included, counts backwards"
+                                                        : ""),
+                 .next = "Look whether both wheels count up when it drives ahead; log a gyro to have it checked.",
+                 .columns = {view.joints[0].motion_name(), view.joints[1].motion_name()},
+                 .value = std::sqrt(turn / along),
+                 .unit = "1"});
+}
+
+void check_effort_scale(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
+                        std::vector<LogFinding>& out) {
+  const auto scales = commission::physical_scales(s.robot, s.model);
+  for (std::size_t j = 0; view.robot_given && scales && j < s.model.p(); ++j) {
+    const std::string& name = s.model.parameters[j].physical;
+    const auto nominal = s.robot.nominal.find(name);
+    if (!s.model.parameters[j].moved_mass || nominal == s.robot.nominal.end() || !(nominal->second > 0.0) ||
+        fit.excitation[j].state != identify::Excitation::identified) {
+      continue;
+    }
+    const double value = (*scales)[j].scale * fit.estimate[static_cast<Eigen::Index>(j)] - (*scales)[j].offset;
+    const double ratio = value / nominal->second;
+    if (!(ratio > 0.0) || (ratio < 3.0 && ratio > 1.0 / 3.0)) {
+      continue;
+    }
+    std::string hint;
+    for (const TorqueUnit& known : kTorqueUnits) {
+      if (std::abs(ratio / known.ratio - 1.0) < (known.ratio < 50.0 ? 0.1 : 0.3)) {
+        hint = fmt::format(" as if efforts were in {}", known.unit);
+      }
+    }
+    if (s.robot.motor && s.robot.motor->gear_ratio > 1.0 && std::abs(ratio * s.robot.motor->gear_ratio - 1.0) < 0.3) {
+      hint = " as if efforts were those of the motor's shaft, before the gear";
+    }
+    for (const TorqueUnit& known : kSpeedUnits) {
+      if (std::abs(ratio / known.ratio - 1.0) < 0.3) {
+        hint = fmt::format(" as if the wheels' motion were in {}", known.unit);
+      }
+    }
+    const bool far = ratio > kMostTimesNominal || ratio < kLeastTimesNominal;
+    out.push_back(
+        {.id = "units.effort",
+         .topic = FindingTopic::units,
+         .severity = far ? FindingSeverity::fatal : FindingSeverity::warning,
+         .sentence = fmt::format("Efforts and motion give a {} of {:.3g} where the robot file has {:.3g}: {:.3g} "
+                                 "times as much{}.",
+                                 name, value, nominal->second, ratio, hint),
+         .next = "Check the unit of the efforts (N·m at the wheel, A, V), effort.kind, and the wheel radius.",
+         .columns = s.measurement.effort_columns,
+         .value = ratio,
+         .unit = "1"});
+  }
+}
+
+void check_sides(const commission::Setting& s, const commission::Fit& fit, std::vector<LogFinding>& out) {
+  for (std::size_t j = 0; j < s.model.p(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    if (s.model.parameters[j].physical == "yaw_inertia" &&
+        fit.excitation[j].state == identify::Excitation::identified &&
+        fit.estimate[at] < -5.0 * fit.residuals.standard_error[at]) {
+      out.push_back({.id = "units.effort_sides",
+                     .topic = FindingTopic::units,
+                     .severity = FindingSeverity::fatal,
+                     .sentence = "The efforts turn the robot the other way than it turns: the yaw inertia comes out "
+                                 "negative.",
+                     .next = "Right and left seem to be swapped, of the efforts or of the motion: check the columns.",
+                     .columns = s.measurement.effort_columns,
+                     .value = fit.estimate[at],
+                     .unit = commission::parameter_unit(s.robot, s.model.parameters[j])});
+    }
+  }
+}
+
+// What the filtered regressor says of each parameter. Returns whether any is excited.
+bool check_excitation(const HealthView& view, LogSource& log, const commission::Setting& s, const commission::Fit& fit,
+                      std::vector<LogFinding>& out) {
+  const bool one_clock = std::ranges::is_sorted(view.log->t);
+  std::vector<inference::ParameterWords> words;
+  for (const model::Parameter& p : s.model.parameters) {
+    words.push_back({p.physical, p.physical_unit, p.excite, inference::kind_of(p.physical)});
+  }
+  std::size_t excited = 0;
+  for (std::size_t j = 0; j < s.model.p(); ++j) {
+    const identify::ExcitationFinding& found = fit.excitation[j];
+    excited += found.state != identify::Excitation::not_excited ? 1 : 0;
+    if (found.state == identify::Excitation::identified) {
+      continue;
+    }
+    const bool missing = found.state == identify::Excitation::not_excited;
+    const auto manoeuvres = inference::missing_manoeuvres({static_cast<Eigen::Index>(j)}, words);
+    out.push_back(
+        about_motion("motion.excitation", missing ? FindingSeverity::warning : FindingSeverity::notice,
+                     fmt::format("{}: {}.", words[j].name, found.reason),
+                     manoeuvres.empty() ? "" : fmt::format("What would show it: {}.", fmt::join(manoeuvres, "; ")),
+                     found.signal_rms, ""));
+  }
+  if (excited == 0) {
+    out.push_back(about_motion("motion.nothing", FindingSeverity::fatal, "The log says nothing about any parameter.",
+                               "Speed up and brake, drive curves to both sides, slow and fast.", 0.0, ""));
+    return false;
+  }
+  const double condition = fit.squares.condition;
+  const FindingSeverity severity = excited < s.model.p() ? FindingSeverity::fine
+                                   : condition > 100.0   ? FindingSeverity::warning
+                                   : condition > 30.0    ? FindingSeverity::notice
+                                                         : FindingSeverity::fine;
+  out.push_back(about_motion("motion.condition", severity,
+                             fmt::format("{} of {} parameters are excited; condition number of the filtered regressor "
+                                         "{:.3g}.",
+                                         excited, s.model.p(), condition),
+                             severity == FindingSeverity::fine
+                                 ? ""
+                                 : "Parameters can hardly be told apart: change speed and yaw rate more, and "
+                                   "independently of each other.",
+                             condition, "1"));
+  inference::InformationOptions options;
+  options.weights = fit.weights;
+  const inference::InformationOverTime over_time =
+      inference::information_over_time(commission::log_moments(log, s, commission::Part::everything), options);
+  for (std::size_t j = 0; one_clock && j < s.model.p(); ++j) {
+    const inference::ParameterInformation& info = over_time.parameters[j];
+    const double share = s.survey.seconds > 0.0 ? info.seconds / s.survey.seconds : 1.0;
+    if (fit.excitation[j].state == identify::Excitation::not_excited || !(info.information > 0.0) || share > 0.1) {
+      continue;
+    }
+    LogFinding f =
+        about_motion("motion.information", FindingSeverity::notice,
+                     fmt::format("{}: four fifths of what the log says stand in {:.3g} s of {:.4g} s.", words[j].name,
+                                 info.seconds, s.survey.seconds),
+                     fmt::format("Repeat that manoeuvre, spread over the drive ({}).", words[j].excite), share, "1");
+    for (const auto& [from, to] : info.spans) {
+      if (++f.stretches <= kMostStretches) {
+        f.when.push_back({from, to});
+      }
+    }
+    out.push_back(f);
+  }
+  return true;
+}
+
+// Effort against motion in time, where a shift explains the log better than none.
+void check_delay(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
+                 std::vector<LogFinding>& out) {
+  TableSource source(*view.log);
+  const std::optional<commission::EffortTiming> timing = commission::effort_timing(source, s, fit);
+  if (!timing) {
+    return;
+  }
+  const double delay = timing->delay, error = timing->standard_error, left = timing->residual_ratio;
+  const bool matters = commission::is_latency(*timing, view.step) ||
+                       (std::abs(delay) > 3.0 * error && left < 0.95 && std::abs(delay) > 0.25 * view.step);
+  const bool large = matters && std::abs(delay) > 0.75 * view.step;
+  const bool latency = view.robot_given && commission::is_latency(*timing, view.step);
+  // Declared errors may allow for a step of it: commissioning weighs that.
+  const model::SensorNoise& declared = view.robot.noise;
+  const bool weighed = declared.effort.value && (declared.wheel_speed.value || declared.wheel_angle.value) &&
+                       timing->beyond() <= view.step;
+  LogFinding f{.id = "time.effort_delay",
+               .topic = FindingTopic::time,
+               .severity = latency && !weighed ? FindingSeverity::fatal
+                           : large || latency  ? FindingSeverity::warning
+                           : matters           ? FindingSeverity::notice
+                                               : FindingSeverity::fine};
+  f.columns = s.measurement.effort_columns;
+  f.value = delay;
+  f.unit = std::string("s");
+  const Interval declared_delay = s.measurement.delay;
+  f.sentence = declared_delay != Interval{} && timing->beyond() == 0.0
+                   ? fmt::format("The effort comes {:.2g} ± {:.1g} s {} the motion (95 %), as the robot file allows.",
+                                 std::abs(delay), 2.0 * error, delay > 0.0 ? "after" : "before")
+               : matters
+                   ? fmt::format(
+                         "The effort comes {:.2g} ± {:.1g} s {} the motion (95 %); shifted by that, {:.0f} % of the "
+                         "residual are left.",
+                         std::abs(delay), 2.0 * error, delay > 0.0 ? "after" : "before", 100.0 * left)
+                   : fmt::format(
+                         "No shift in time between effort and motion explains the log better: the best, {:.2g} s, "
+                         "leaves {:.0f} % of the residual.",
+                         delay, 100.0 * left);
+  const double half = delay / view.step;
+  const bool held = matters && s.measurement.hold == Hold::first_order && std::abs(half + 0.5) < 0.2;
+  const bool measured = matters && s.measurement.hold == Hold::zero_order && std::abs(half - 0.5) < 0.2;
+  f.next = held       ? "That is half a step: the efforts look like commands that are held. Set effort.hold to "
+                        "zero_order in the robot file."
+           : measured ? "That is half a step: the efforts look measured. Set effort.hold to first_order in the "
+                        "robot file."
+           : large    ? "Stamp both with one clock where they are measured; where they are, the actuator or a "
+                        "sensor is slow: `wheelwright gap` tells them apart."
+           : matters  ? "It is less than a step: `effort.hold` in the robot file counts for half of one."
+                      : "";
+  out.push_back(f);
+}
+
+void check_remainder(const commission::Setting& s, const commission::Fit& fit, std::vector<LogFinding>& out) {
+  for (std::size_t i = 0; i < s.model.n(); ++i) {
+    const identify::OutputResidual& o = fit.residuals.outputs[i];
+    const double share = o.torque_rms > 0.0 ? o.rms / o.torque_rms : 0.0;
+    if (share > 0.2) {
+      out.push_back(about_motion(
+          "motion.unexplained", FindingSeverity::notice,
+          fmt::format("A first fit leaves {:.0f} % of the effort ({}) unexplained.", 100.0 * share, s.model.outputs[i]),
+          "Thresholds will be as wide as that; `wheelwright gap` says what it may come from.", share, "1"));
+    }
+  }
+}
+
+}  // namespace
+
+bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
+  if (!view.has_motion()) {
+    return false;
+  }
+  check_directions(view, findings);
+  check_traction(view, findings);
+  if (!view.has_effort()) {
+    return false;
+  }
+  check_effort_sense(view, findings);
+  try {
+    TableSource log(*view.log);
+    Robot robot = view.robot;
+    const commission::Setting s = commission::settle(log, robot);
+    const commission::Fit fit = commission::fit_log(log, s, commission::Part::everything, kUnusedRisk);
+    const bool excited = check_excitation(view, log, s, fit, findings);
+    if (excited) {
+      check_effort_scale(view, s, fit, findings);
+      check_sides(s, fit, findings);
+      check_mirrored(view, s, fit, findings);
+      check_remainder(s, fit, findings);
+      check_delay(view, s, fit, findings);
+    }
+    return excited;
+  } catch (const Error& error) {
+    findings.push_back(about_motion("motion.refused", FindingSeverity::fatal,
+                                    fmt::format("Commissioning refuses the log: {}.", error.what()), "", std::nan(""),
+                                    ""));
+    return false;
+  }
+}
+
+}  // namespace wheelwright::doctor

@@ -1,0 +1,524 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <Eigen/Dense>
+
+#include "commission/doctor/log_health.hpp"
+#include "commission/pose_origin.hpp"
+#include "core/error.hpp"
+#include "core/statistics.hpp"
+#include "identify/inference/kinematic_calibration.hpp"
+
+namespace wheelwright::doctor {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kWindow = 1.0;     // s
+constexpr std::size_t kFewest = 8;  // windows
+constexpr double kNeeded = 0.05;    // of a mean square, that the other one alone leaves
+constexpr double kClear = 4.0;      // standard errors
+constexpr double kFastest = 10.0;   // rad in a window
+constexpr double kAligned = 0.8;    // of displacements with the heading, for a forward direction
+constexpr double kFits = 0.5;       // least share of the variation that wheels must explain of a pose
+
+// What happened within a window.
+struct Window {
+  double right = 0.0, left = 0.0;  // turned by the wheels, rad
+  double heading = 0.0;            // change of theta, as logged
+  double gyro = 0.0;               // ∫ gyro_z dt
+  double x = 0.0, y = 0.0;         // displacement
+  double middle = 0.0;             // mean of theta at both ends, as logged
+  [[nodiscard]] double along() const { return 0.5 * (right + left); }
+  [[nodiscard]] double turn() const { return 0.5 * (right - left); }
+};
+
+double integral(const std::vector<double>& t, const std::vector<double>& v, std::size_t a, std::size_t b) {
+  double sum = 0.0;
+  for (std::size_t k = a + 1; k <= b; ++k) {
+    sum += 0.5 * (v[k] + v[k - 1]) * (t[k] - t[k - 1]);
+  }
+  return sum;
+}
+
+template <typename Visit>
+void each_window(const HealthView& view, Visit visit) {
+  const std::vector<double>& t = view.log->t;
+  for (const auto& [first, last] : view.segments) {
+    std::size_t a = first;
+    for (std::size_t b = first; b < last; ++b) {
+      if (t[b] - t[a] >= kWindow) {
+        visit(a, b);
+        a = b;
+      }
+    }
+  }
+}
+
+std::vector<Window> windows_of(const HealthView& view) {
+  const std::vector<double>*x = view.column("x"), *y = view.column("y"), *theta = view.column("theta"),
+        *gyro = view.column("gyro_z");
+  const std::vector<double>& t = view.log->t;
+  const auto turned = [&](const JointView& j, std::size_t a, std::size_t b) {
+    return j.angle != nullptr ? (*j.angle)[b] - (*j.angle)[a] : integral(t, *j.speed, a, b);
+  };
+  std::vector<Window> windows;
+  each_window(view, [&](std::size_t a, std::size_t b) {
+    Window w;
+    w.right = turned(view.joints[0], a, b);
+    w.left = turned(view.joints[1], a, b);
+    if (theta != nullptr) {
+      w.heading = (*theta)[b] - (*theta)[a];
+      w.middle = 0.5 * ((*theta)[b] + (*theta)[a]);
+    }
+    if (x != nullptr && y != nullptr) {
+      w.x = (*x)[b] - (*x)[a];
+      w.y = (*y)[b] - (*y)[a];
+    }
+    if (gyro != nullptr) {
+      w.gyro = integral(t, *gyro, a, b);
+    }
+    windows.push_back(w);
+  });
+  return windows;
+}
+
+// value = along·S + turn·T over windows, S and T the wheels' mean and half difference.
+struct WheelFit {
+  double along = 0.0, turn = 0.0;
+  bool along_clear = false, turn_clear = false;  // told from zero, and needed beside the other
+  double explained = 0.0;                        // share of the variation
+};
+
+std::optional<WheelFit> fit_wheels(const std::vector<Window>& windows, const std::vector<double>& value) {
+  const auto n = static_cast<Eigen::Index>(windows.size());
+  if (windows.size() < kFewest) {
+    return std::nullopt;
+  }
+  Eigen::MatrixXd A(n, 2);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    A(i, 0) = windows[static_cast<std::size_t>(i)].along();
+    A(i, 1) = windows[static_cast<std::size_t>(i)].turn();
+  }
+  const Eigen::VectorXd b = Eigen::Map<const Eigen::VectorXd>(value.data(), n);
+  const Eigen::Matrix2d gram = A.transpose() * A;
+  const double scale = gram.trace();
+  if (!(scale > 0.0) || !(b.squaredNorm() > 0.0)) {
+    return std::nullopt;
+  }
+  const Eigen::Matrix2d inverse = (gram + 1e-6 * scale * Eigen::Matrix2d::Identity()).inverse();
+  const Eigen::Vector2d c = inverse * (A.transpose() * b);
+  const double rest = (b - A * c).squaredNorm();
+  const double variance = rest / static_cast<double>(n - 2);
+  WheelFit fit{.along = c[0], .turn = c[1]};
+  // On a circle either one tells everything.
+  const auto needed = [&](Eigen::Index other) {
+    const double beside = gram(other, other) > 0.0 ? std::pow(A.col(other).dot(b), 2) / gram(other, other) : 0.0;
+    return b.squaredNorm() - beside > kNeeded * b.squaredNorm();
+  };
+  fit.along_clear =
+      std::abs(c[0]) > kClear * std::sqrt(variance * inverse(0, 0)) && gram(0, 0) > 1e-3 * scale && needed(1);
+  fit.turn_clear =
+      std::abs(c[1]) > kClear * std::sqrt(variance * inverse(1, 1)) && gram(1, 1) > 1e-3 * scale && needed(0);
+  fit.explained = 1.0 - rest / b.squaredNorm();
+  return fit;
+}
+
+LogFinding about_units(const char* id, FindingSeverity severity, std::string sentence, std::string next,
+                       std::vector<std::string> columns, double value) {
+  return {.id = id,
+          .topic = FindingTopic::units,
+          .severity = severity,
+          .sentence = std::move(sentence),
+          .next = std::move(next),
+          .columns = std::move(columns),
+          .value = value,
+          .unit = "1"};
+}
+
+// How well displacements lie along scale·theta + offset: 1 exactly, 0 not at all; and the offset, modulo half a turn.
+struct Alignment {
+  double quality = 0.0, offset = 0.0;
+};
+
+Alignment alignment(const std::vector<Window>& windows, double scale) {
+  std::complex<double> sum = 0.0;
+  double weight = 0.0;
+  for (const Window& w : windows) {
+    const double squared = w.x * w.x + w.y * w.y;
+    sum += squared * std::polar(1.0, 2.0 * (std::atan2(w.y, w.x) - scale * w.middle));
+    weight += squared;
+  }
+  return {weight > 0.0 ? std::abs(sum) / weight : 0.0, 0.5 * std::arg(sum)};
+}
+
+// Scale that makes rad with the usual sign of the logged heading: 1, −1, or a degree. Degrees are believed only where
+// the heading changes faster than any wheeled robot turns.
+double heading_scale(const std::vector<Window>& windows) {
+  double best = 1.0, quality = alignment(windows, 1.0).quality;
+  const bool fast = std::ranges::any_of(windows, [](const Window& w) { return std::abs(w.heading) > kFastest; });
+  for (const double scale : {kDegree, -1.0, -kDegree}) {
+    const double other = alignment(windows, scale).quality;
+    if (quality < 0.9 && other > quality + 0.1 && other > 0.9 && (fast || scale == -1.0)) {
+      best = scale;
+      quality = other;
+    }
+  }
+  return best;
+}
+
+// How far the position moves per rad of the wheels in nearly straight windows; nothing where there are few.
+std::optional<double> straight_ratio(const std::vector<Window>& windows) {
+  std::vector<double> ratios;
+  double longest = 0.0;
+  for (const Window& w : windows) {
+    longest = std::max(longest, std::abs(w.along()));
+  }
+  for (const Window& w : windows) {
+    if (std::abs(w.along()) > 0.2 * longest && std::abs(w.turn()) < 0.1 * std::abs(w.along())) {
+      ratios.push_back(std::hypot(w.x, w.y) / std::abs(w.along()));
+    }
+  }
+  if (ratios.size() < kFewest) {
+    return std::nullopt;
+  }
+  return core::median(std::move(ratios));
+}
+
+// Way along the heading in each window, step by step: position noise cancels but for the ends.
+std::vector<double> forward_of(const HealthView& view, const std::vector<Window>& windows, double scale) {
+  const double offset = alignment(windows, scale).offset;
+  const std::vector<double>&x = *view.column("x"), &y = *view.column("y"), &theta = *view.column("theta");
+  std::vector<double> out;
+  each_window(view, [&](std::size_t a, std::size_t b) {
+    double way = 0.0;
+    for (std::size_t k = a + 1; k <= b; ++k) {
+      const double direction = 0.5 * scale * (theta[k] + theta[k - 1]) + offset;
+      way += (x[k] - x[k - 1]) * std::cos(direction) + (y[k] - y[k - 1]) * std::sin(direction);
+    }
+    out.push_back(way);
+  });
+  return out;
+}
+
+// Signs and sides. `yaw` is that of `column`; nothing where that is not to be had, likewise `forward`.
+void check_sides(const std::optional<WheelFit>& yaw, const std::optional<WheelFit>& forward, const std::string& column,
+                 std::vector<LogFinding>& out) {
+  if (!yaw || !(yaw->explained > kFits)) {
+    return;
+  }
+  const double along = yaw->along_clear ? yaw->along : 0.0, turn = yaw->turn_clear ? yaw->turn : 0.0;
+  if (std::abs(along) > 2.0 * std::abs(turn)) {
+    const char* side = along > 0.0 ? "left" : "right";
+    const char* suffix = along > 0.0 ? "l" : "r";
+    out.push_back(
+        about_units("units.wheel_sign", FindingSeverity::fatal,
+                    fmt::format("{} follows the sum of the wheels, not their difference: the {} wheel counts "
+                                "backwards.",
+                                column, side),
+                    fmt::format("Turn the sign of the {} wheel's speed and angle (and look whether its effort "
+                                "needs it too).",
+                                side),
+                    {fmt::format("omega_{}", suffix), fmt::format("phi_{}", suffix)}, along));
+    return;
+  }
+  if (turn < 0.0 && std::abs(turn) > 2.0 * std::abs(along)) {
+    const bool back = forward && forward->along_clear && forward->along < 0.0;
+    out.push_back(about_units(
+        "units.sides", FindingSeverity::fatal,
+        back ? fmt::format("Both wheels count backwards: {} and position go the other way.", column)
+             : fmt::format("{} turns the other way than the wheels say.", column),
+        back ? "Turn the signs of both wheels."
+             : fmt::format("Right and left wheel are swapped, or {} counts clockwise: it has to grow in a left turn.",
+                           column),
+        {column}, turn));
+  }
+}
+
+// Scales against the robot file's radius r and track D: `lin` and `yaw` are what was found over what they should be.
+void check_scales(const HealthView& view, std::optional<double> lin, std::optional<double> yaw,
+                  std::vector<LogFinding>& out) {
+  const std::vector<std::string> wheels = {view.joints[0].motion_name(), view.joints[1].motion_name()};
+  const double main = lin ? *lin : yaw ? *yaw : 1.0;
+  const bool together = !lin || !yaw || std::abs(std::log(*lin / *yaw)) < 1.2;
+  const bool angles = view.joints[0].angle != nullptr;
+  const std::string unit = unit_for_ratio(1.0 / main, true);
+  const double gear = view.robot.motor ? view.robot.motor->gear_ratio : 1.0;
+  if (together && std::abs(std::log(main)) > 1.2) {
+    const bool shaft = gear > 3.0 && std::abs(1.0 / main / gear - 1.0) < 0.1;
+    const std::string looks = shaft          ? " Those of the motor's shaft, before the gear?"
+                              : unit.empty() ? ""
+                              : angles       ? fmt::format(" Their unit looks like that of {}.", unit)
+                                             : fmt::format(" They look like {}.", unit);
+    out.push_back(about_units("units.wheel_speed", FindingSeverity::fatal,
+                              fmt::format("{} are {:.3g} times what the pose says with the robot file's radius{}.{}",
+                                          fmt::join(wheels, " and "), 1.0 / main, yaw ? " and track" : "", looks),
+                              "Convert the wheels' motion to rad and rad/s at the wheel, or correct wheel_radius.",
+                              wheels, 1.0 / main));
+    return;
+  }
+  if (lin && std::abs(std::log(*lin)) > 1.2) {
+    const std::string of = unit_for_ratio(*lin, false);
+    const char* looks = of == "thousandths" ? " They look like mm." : of == "hundredths" ? " They look like cm." : "";
+    out.push_back(about_units("units.position", FindingSeverity::fatal,
+                              fmt::format("x and y move {:.4g} times as far as the wheels roll.{}", *lin, looks),
+                              "Convert x and y to m.", {"x", "y"}, *lin));
+  } else if (lin && std::abs(*lin - 1.0) > 0.05) {
+    out.push_back(about_units(
+        "units.wheel_radius", std::abs(*lin - 1.0) > 0.15 ? FindingSeverity::warning : FindingSeverity::notice,
+        fmt::format("The robot drives as if its wheels had a radius of {:.4g} m; the robot file says "
+                    "{:.4g} m.",
+                    *lin * view.robot.wheel_radius, view.robot.wheel_radius),
+        std::abs(*lin - 0.5) < 0.05 ? "Correct wheel_radius: it looks like a diameter."
+                                    : "Correct wheel_radius; `identify` measures it.",
+        {"x", "y"}, *lin));
+  }
+  if (yaw && *yaw > 10.0) {
+    out.push_back(about_units(
+        "units.heading", FindingSeverity::fatal,
+        fmt::format("The heading turns {:.3g} times as far as the wheels say: it looks like degrees.", *yaw),
+        "Convert theta (gyro_z) to rad (rad/s).", {"theta"}, *yaw));
+  } else if (yaw && std::abs(*yaw - 1.0) > 0.1) {
+    out.push_back(
+        about_units("units.track_width", FindingSeverity::warning,
+                    fmt::format("The robot turns like one with a track of {:.3g} m; the robot file says {:.3g} m.",
+                                view.robot.track_width / *yaw * lin.value_or(1.0), view.robot.track_width),
+                    "Wheels that scrub turn a robot less than they roll: take the effective track, which "
+                    "`identify` measures, or correct track_width.",
+                    {"theta"}, *yaw));
+  }
+}
+
+// Wheel angles against the speeds beside them.
+void check_angles(const HealthView& view, std::vector<LogFinding>& out) {
+  const std::vector<double>& t = view.log->t;
+  for (const JointView& j : view.joints) {
+    if (j.angle == nullptr || j.speed == nullptr) {
+      continue;
+    }
+    double ss = 0.0, sa = 0.0, aa = 0.0;
+    each_window(view, [&](std::size_t a, std::size_t b) {
+      const double by_speed = integral(t, *j.speed, a, b), by_angle = (*j.angle)[b] - (*j.angle)[a];
+      ss += by_speed * by_speed;
+      sa += by_speed * by_angle;
+      aa += by_angle * by_angle;
+    });
+    if (!(ss > 0.0) || !(aa > 0.0)) {
+      continue;
+    }
+    const double ratio = sa / ss, fits = sa / std::sqrt(ss * aa);
+    if (fits > 0.99 && std::abs(ratio - 1.0) < 0.02) {
+      continue;
+    }
+    const std::string unit = ratio > 0.0 ? unit_for_ratio(1.0 / ratio, true) : "";
+    const bool unlike = std::abs(fits) < 0.9;
+    const bool wrong = unlike || std::abs(ratio - 1.0) > 0.1;
+    out.push_back(about_units(
+        "units.angle_and_speed", wrong ? FindingSeverity::fatal : FindingSeverity::warning,
+        unlike ? fmt::format("{} and the integral of {} have a correlation of only {:.2f}.", j.angle_name, j.speed_name,
+                             fits)
+               : fmt::format("{} changes by {:.4g} times the integral of {}.{}", j.angle_name, ratio, j.speed_name,
+                             unit.empty() ? "" : fmt::format(" The speed looks like {}.", unit)),
+        unlike ? "Columns of different wheels, or of different clocks: check their names (--map)."
+               : "One of them has another unit, sign or gear ratio: leave out the wrong one or convert it.",
+        {j.angle_name, j.speed_name}, ratio));
+  }
+}
+
+// Of a log longer than kLongEnough as many stretches of a minute, spread over it; else nothing.
+std::optional<LogTable> stretches_of(const HealthView& view) {
+  constexpr double kStretch = 60.0, kLongEnough = 1200.0;  // s
+  const LogTable& log = *view.log;
+  const auto rows_of = [&](double seconds) { return static_cast<std::size_t>(seconds / view.step); };
+  if (!(view.step > 0.0) || log.rows() <= rows_of(kLongEnough)) {
+    return std::nullopt;
+  }
+  LogTable spread;
+  spread.names = log.names;
+  spread.columns.resize(log.columns.size());
+  constexpr auto kStretches = static_cast<std::size_t>(kLongEnough / kStretch);
+  for (std::size_t k = 0; k < kStretches; ++k) {
+    const std::size_t first = k * log.rows() / kStretches;
+    const LogTable stretch = core::slice(log, first, std::min(first + rows_of(kStretch), log.rows()));
+    const std::size_t before = spread.rows();
+    spread.segment_starts.push_back(before);
+    for (const std::size_t start : stretch.segment_starts) {
+      if (start > 0) {
+        spread.segment_starts.push_back(before + start);
+      }
+    }
+    spread.t.insert(spread.t.end(), stretch.t.begin(), stretch.t.end());
+    for (std::size_t c = 0; c < spread.columns.size(); ++c) {
+      spread.columns[c].insert(spread.columns[c].end(), stretch.columns[c].begin(), stretch.columns[c].end());
+    }
+  }
+  return spread;
+}
+
+void check_pose_delay(const HealthView& view, std::vector<LogFinding>& out) {
+  if (!view.robot_given || view.joints[0].speed == nullptr || view.joints[1].speed == nullptr) {
+    return;
+  }
+  inference::KinematicOptions options;
+  options.wheel_radius = view.robot.wheel_radius;
+  options.track_width = view.robot.track_width;
+  options.radius = options.axle_offset = view.column("x") != nullptr && view.column("y") != nullptr;
+  options.largest_delay = 0.3;
+  const std::optional<LogTable> spread = stretches_of(view);
+  try {
+    const inference::KinematicQuantity delay =
+        inference::calibrate_kinematics(spread ? *spread : *view.log, options).delay;
+    if (delay.state == inference::KinematicState::identified) {
+      const bool late = delay.estimate > 3.0 * delay.standard_error && delay.estimate > 1.5 * view.step;
+      out.push_back(
+          {.id = "time.pose_delay",
+           .topic = FindingTopic::time,
+           .severity = late ? FindingSeverity::warning : FindingSeverity::fine,
+           .sentence = fmt::format("The pose lags behind the wheels by {:.3g} s (95 %: {:.3g} to {:.3g}).",
+                                   delay.estimate, delay.lower, delay.upper),
+           .next = late ? "Stamp the pose when the picture or scan is taken, not when it has been worked out." : "",
+           .columns = {"theta"},
+           .value = delay.estimate,
+           .unit = "s"});
+    }
+  } catch (const InvalidArgument&) {
+    // Too few windows: nothing is claimed.
+  }
+}
+
+// A pose that the wheels explain to the last digit.
+void check_pose_origin(const HealthView& view, std::vector<LogFinding>& out) {
+  if (view.column("theta") == nullptr) {
+    return;
+  }
+  filter::OdometryMeasurement m;
+  m.heading = true;
+  m.position = view.column("x") != nullptr && view.column("y") != nullptr;
+  m.nominal_step = view.step;
+  const bool angles = view.joints[0].angle != nullptr && view.joints[1].angle != nullptr;
+  m.motion = angles ? MotionKind::angle : MotionKind::speed;
+  for (const JointView& j : view.joints) {
+    m.motion_columns.push_back(angles ? j.angle_name : j.speed_name);
+  }
+  TableSource log(*view.log);
+  const commission::PoseOrigin origin = commission::pose_origin(log, m, kWindow, view.robot);
+  if (origin.sentence.empty()) {
+    return;
+  }
+  std::string sentence = origin.sentence + ".";
+  sentence[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(sentence[0])));
+  out.push_back(about_units("signals.pose_repeats_wheels", FindingSeverity::warning, std::move(sentence),
+                            origin.undecided ? "It is not used."
+                                             : "It is not used: log a pose that does not come from the wheels "
+                                               "(camera, lidar, motion capture), or a gyro.",
+                            origin.heading_repeats && m.position ? std::vector<std::string>{"x", "y", "theta"}
+                            : origin.heading_repeats             ? std::vector<std::string>{"theta"}
+                                                                 : std::vector<std::string>{"x", "y"},
+                            origin.heading_repeats ? origin.heading_rest : origin.position_rest));
+  out.back().topic = FindingTopic::signals;
+  out.back().unit = origin.heading_repeats ? "rad" : "m";
+}
+
+}  // namespace
+
+void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
+  check_angles(view, findings);
+  const bool theta = view.column("theta") != nullptr, gyro = view.column("gyro_z") != nullptr;
+  if (view.joints.size() != 2 || !view.has_motion() || (!theta && !gyro)) {
+    return;
+  }
+  check_pose_origin(view, findings);
+  const std::vector<Window> windows = windows_of(view);
+  const bool position = theta && view.column("x") != nullptr && view.column("y") != nullptr;
+  const double scale = position ? heading_scale(windows) : 1.0;
+  std::vector<double> turned, by_gyro;
+  for (const Window& w : windows) {
+    turned.push_back(theta ? w.heading * std::abs(scale) : w.gyro);
+    by_gyro.push_back(w.gyro);
+  }
+  const double aligned = position ? alignment(windows, scale).quality : 1.0;
+  const auto forward =
+      position && aligned > kAligned ? fit_wheels(windows, forward_of(view, windows, scale)) : std::nullopt;
+  const auto yaw = fit_wheels(windows, turned);
+  const std::size_t before = findings.size();
+  if (std::abs(scale) < 1.0) {
+    findings.push_back(about_units("units.heading", FindingSeverity::fatal,
+                                   "theta fits the direction of travel only when it is read as degrees.",
+                                   "Convert theta to rad.", {"theta"}, 1.0 / kDegree));
+  }
+  if (scale < 0.0) {
+    findings.push_back(about_units("units.heading_sign", FindingSeverity::fatal,
+                                   "theta fits the direction of travel only with its sign turned.",
+                                   "theta has to grow counterclockwise from x to y.", {"theta"}, -1.0));
+  }
+  if (aligned < kAligned) {
+    findings.push_back(about_units(
+        "units.pose_frame", FindingSeverity::notice,
+        fmt::format("The position does not move along theta (agreement {:.2f} of 1): it slides, "
+                    "or theta and x, y are of different frames.",
+                    aligned),
+        "Give x, y and theta in one fixed frame; the sign of driving was not checked.", {"x", "y", "theta"}, aligned));
+  }
+  check_sides(yaw, forward, theta ? "theta" : "gyro_z", findings);
+  if (theta && gyro) {
+    check_sides(fit_wheels(windows, by_gyro), std::nullopt, "gyro_z", findings);
+    double tt = 0.0, tg = 0.0, gg = 0.0;
+    for (std::size_t k = 0; k < windows.size(); ++k) {
+      tt += turned[k] * turned[k];
+      tg += turned[k] * by_gyro[k];
+      gg += by_gyro[k] * by_gyro[k];
+    }
+    const double ratio = tt > 0.0 ? tg / tt : 1.0;
+    if (gg > 0.0 && tg / std::sqrt(tt * gg) > 0.9 && std::abs(ratio - 1.0) > 0.1) {
+      const std::string unit = unit_for_ratio(ratio, true);
+      findings.push_back(about_units("units.gyro", ratio > 10.0 ? FindingSeverity::fatal : FindingSeverity::warning,
+                                     fmt::format("The gyro turns {:.3g} times as far as theta{}.", ratio,
+                                                 unit.empty() ? "" : fmt::format(": it looks like {}", unit)),
+                                     "Convert gyro_z to rad/s, or calibrate it.", {"gyro_z"}, ratio));
+    }
+  }
+  const auto size = [](const std::optional<WheelFit>& fit, bool of_turn, double expected) -> std::optional<double> {
+    if (!fit || !(fit->explained > kFits)) {
+      return std::nullopt;
+    }
+    const double main = of_turn ? fit->turn : fit->along, cross = of_turn ? fit->along : fit->turn;
+    const bool clear = of_turn ? fit->turn_clear : fit->along_clear;
+    return clear && std::abs(main) > std::abs(cross) ? std::optional(std::abs(main) / expected) : std::nullopt;
+  };
+  if (view.robot_given) {
+    const double r = view.robot.wheel_radius, c = r / view.robot.track_width;
+    std::optional<double> lin = size(forward, false, r);
+    if (const auto straight = position ? straight_ratio(windows) : std::nullopt; straight && !lin) {
+      lin = *straight / r;
+    }
+    check_scales(view, lin, size(yaw, true, 2.0 * c), findings);
+  }
+  if (yaw && yaw->turn_clear && yaw->explained < 0.8) {
+    findings.push_back(about_units("units.odometry", FindingSeverity::warning,
+                                   fmt::format("Wheels explain only {:.0f} % of the turning.", 100.0 * yaw->explained),
+                                   "Slip, a late or wrong column, or a frame that jumps: compare both by eye.",
+                                   {theta ? "theta" : "gyro_z"}, yaw->explained));
+  }
+  const bool sound = std::ranges::none_of(findings.begin() + static_cast<std::ptrdiff_t>(before), findings.end(),
+                                          [](const LogFinding& f) { return f.severity == FindingSeverity::fatal; });
+  if (theta && sound) {
+    check_pose_delay(view, findings);
+  }
+  if (sound && yaw && yaw->turn_clear) {
+    findings.push_back(
+        about_units("units.pose_fits", FindingSeverity::fine,
+                    fmt::format("Wheels explain {:.4g} % of the turning, with the signs that they should "
+                                "have.",
+                                100.0 * yaw->explained),
+                    "", {}, yaw->explained));
+  }
+}
+
+}  // namespace wheelwright::doctor
