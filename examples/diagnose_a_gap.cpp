@@ -15,7 +15,7 @@
 #include <fmt/format.h>
 
 #include <wheelwright/gap/diagnose.hpp>
-#include <wheelwright/gap/effect.hpp>
+#include <wheelwright/gap/effects/effect.hpp>
 #include <wheelwright/model/sim/simulation.hpp>
 #include <wheelwright/results/scenario_file.hpp>
 

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "fuzz/fuzz.hpp"
-#include "gap/discrimination.hpp"
-#include "gap/drive.hpp"
+#include "gap/next/discrimination.hpp"
+#include "gap/rows/drive.hpp"
 #include "model/filter/measurement.hpp"
 #include "model/sim/simulation.hpp"
 #include "results/gap_json.hpp"

@@ -314,7 +314,7 @@ words urdf robots/robot_description.cpp robots/wheel_geometry.cpp robots/robot_o
 words controllers robots/controller_file.cpp
 cp model.dict claims.dict
 words columns robots/robot_keys.cpp
-words gap results/gap_json.cpp gap/catalogue_actuator.cpp gap/catalogue_friction.cpp gap/catalogue_geometry.cpp
+words gap results/gap_json.cpp gap/effects/catalogue_actuator.cpp gap/effects/catalogue_friction.cpp gap/effects/catalogue_geometry.cpp
 words record results/fleet_json.cpp
 words simulator robots/mjcf_document.cpp robots/sdf_document.cpp robots/urdf_document.cpp
 words scenario results/scenario_file.cpp robots/robot_keys.cpp

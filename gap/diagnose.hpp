@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "core/log.hpp"
+#include "gap/causes/selection.hpp"
 #include "gap/diagnosis.hpp"
-#include "gap/effect.hpp"
-#include "gap/gap_rows.hpp"
-#include "gap/selection.hpp"
+#include "gap/effects/effect.hpp"
+#include "gap/rows/gap_rows.hpp"
 
 namespace wheelwright::gap {
 

@@ -14,8 +14,8 @@
 #include <Eigen/Core>
 
 #include "core/log.hpp"
-#include "gap/effect.hpp"
-#include "gap/gap_rows.hpp"
+#include "gap/effects/effect.hpp"
+#include "gap/rows/gap_rows.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::gap {

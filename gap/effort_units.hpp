@@ -8,7 +8,7 @@
 
 #include "core/log.hpp"
 #include "gap/diagnosis.hpp"
-#include "gap/drive.hpp"
+#include "gap/rows/drive.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::gap {

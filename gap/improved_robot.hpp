@@ -10,8 +10,8 @@
 #include <Eigen/Core>
 
 #include "core/interval.hpp"
-#include "gap/drive.hpp"
-#include "gap/gap_rows.hpp"
+#include "gap/rows/drive.hpp"
+#include "gap/rows/gap_rows.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::gap {

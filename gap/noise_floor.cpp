@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/statistics.hpp"
-#include "gap/drive.hpp"
-#include "gap/gap_rows.hpp"
+#include "gap/rows/drive.hpp"
+#include "gap/rows/gap_rows.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <Eigen/Core>
 
-#include "gap/drive.hpp"
-#include "gap/gap_rows.hpp"
+#include "gap/rows/drive.hpp"
+#include "gap/rows/gap_rows.hpp"
 
 namespace wheelwright::gap {
 

@@ -12,10 +12,10 @@
 
 #include "core/error.hpp"
 #include "core/linear_algebra.hpp"
-#include "gap/drive.hpp"
-#include "gap/effect.hpp"
+#include "gap/causes/selection.hpp"
+#include "gap/effects/effect.hpp"
 #include "gap/noise_floor.hpp"
-#include "gap/selection.hpp"
+#include "gap/rows/drive.hpp"
 #include "model/filter/measurement.hpp"
 
 namespace wheelwright::gap {

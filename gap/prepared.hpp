@@ -12,9 +12,9 @@
 #include "core/log.hpp"
 #include "gap/diagnose.hpp"
 #include "gap/diagnosis.hpp"
-#include "gap/drive.hpp"
 #include "gap/effort_units.hpp"
-#include "gap/gap_rows.hpp"
+#include "gap/rows/drive.hpp"
+#include "gap/rows/gap_rows.hpp"
 
 namespace wheelwright::gap {
 

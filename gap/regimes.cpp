@@ -13,7 +13,7 @@
 #include "core/check.hpp"
 #include "core/regression.hpp"
 #include "core/statistics.hpp"
-#include "gap/drive.hpp"
+#include "gap/rows/drive.hpp"
 
 namespace wheelwright::gap {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "bounds/box.hpp"
 #include "gap/diagnosis.hpp"
-#include "gap/drive.hpp"
+#include "gap/rows/drive.hpp"
 
 namespace wheelwright::gap {
 

@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "gap/drive.hpp"
+#include "gap/rows/drive.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::gap {

@@ -11,11 +11,11 @@
 #include "core/error.hpp"
 #include "core/for_all.hpp"
 #include "core/statistics.hpp"
-#include "gap/block_gram.hpp"
-#include "gap/gap_rows.hpp"
 #include "gap/improved_robot.hpp"
 #include "gap/noise_floor.hpp"
 #include "gap/prepared.hpp"
+#include "gap/rows/block_gram.hpp"
+#include "gap/rows/gap_rows.hpp"
 #include "identify/noise_level.hpp"
 #include "model/sim/plant.hpp"
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/candidate.hpp"
+#include "gap/causes/candidate.hpp"
 #include "gap/diagnosis.hpp"
 #include "gap/prepared.hpp"
 #include "gap/rollout.hpp"

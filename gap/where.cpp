@@ -18,8 +18,8 @@
 #include "core/limits.hpp"
 #include "core/log.hpp"
 #include "core/statistics.hpp"
-#include "gap/candidate.hpp"
-#include "gap/drive.hpp"
+#include "gap/causes/candidate.hpp"
+#include "gap/rows/drive.hpp"
 #include "identify/moments.hpp"
 
 namespace wheelwright::gap {

@@ -10,8 +10,8 @@
 #include <Eigen/Core>
 
 #include "gap/diagnosis.hpp"
-#include "gap/drive.hpp"
 #include "gap/regimes.hpp"
+#include "gap/rows/drive.hpp"
 
 namespace wheelwright::gap {
 

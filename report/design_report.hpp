@@ -7,7 +7,7 @@
 
 #include "commission/design/detection.hpp"
 #include "commission/design/manoeuvre.hpp"
-#include "gap/discrimination_design.hpp"
+#include "gap/next/discrimination_design.hpp"
 #include "report/page.hpp"
 
 namespace wheelwright::report {

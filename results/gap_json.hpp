@@ -10,8 +10,8 @@
 
 #include "files/json.hpp"
 #include "gap/diagnosis.hpp"
-#include "gap/discrimination.hpp"
-#include "gap/further_drive.hpp"
+#include "gap/next/discrimination.hpp"
+#include "gap/next/further_drive.hpp"
 
 namespace wheelwright::results {
 

@@ -5,7 +5,7 @@
     calibrate_gap.py ANSWERS.json RESULTS [ANSWERS.json RESULTS]...    a pair for each world; RESULTS has CASE/gap.json
     calibrate_gap.py --judge ANSWERS.json RESULTS [...]                what gap.json promises, against truth
 
-The first counts diagnoses by verdict and number of causes (the table of gap/confidence.cpp) and judges each world by the
+The first counts diagnoses by verdict and number of causes (the table of gap/causes/confidence.cpp) and judges each world by the
 others: what the rest promises for its answers, and what came of it. Names are exact; a payload with the shift of the centre
 that it makes is a payload off the middle.
 """
@@ -48,7 +48,7 @@ class Record:
 
 
 def kind(gap):
-    """Verdict and number of causes: what gap/confidence.cpp tells apart."""
+    """Verdict and number of causes: what gap/causes/confidence.cpp tells apart."""
     if gap["verdict"] in ("no_gap", "unexplained"):
         return gap["verdict"]
     return gap["verdict"] + (", several causes" if len(gap["causes"]) > 1 else ", one cause")

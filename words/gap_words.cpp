@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "gap/effect.hpp"
+#include "gap/effects/effect.hpp"
 #include "gap/where.hpp"
 #include "words/text.hpp"
 

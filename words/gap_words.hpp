@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gap/diagnosis.hpp"
-#include "gap/effect.hpp"
+#include "gap/effects/effect.hpp"
 
 namespace wheelwright::words {
 

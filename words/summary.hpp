@@ -17,7 +17,7 @@
 #include "commission/watch/incident_watch.hpp"
 #include "commission/watch/risk_watch.hpp"
 #include "gap/diagnosis.hpp"
-#include "gap/discrimination_design.hpp"
+#include "gap/next/discrimination_design.hpp"
 #include "identify/inference/identification.hpp"
 #include "study/bound_derivatives.hpp"
 #include "study/fleet_result.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: QR on the rows themselves, block by block.
-#include "gap/block_gram.hpp"
+#include "gap/rows/block_gram.hpp"
 
 #include <cmath>
 #include <random>

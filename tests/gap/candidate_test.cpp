@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: every pair of candidates tried one after the other.
-#include "gap/candidate.hpp"
+#include "gap/causes/candidate.hpp"
 
 #include <algorithm>
 #include <limits>

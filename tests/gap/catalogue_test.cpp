@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: inverse dynamics of prescribed smooth motions, written from the physics of each effect and not from the
 // catalogue's columns. With the true coefficient the column must take the residual away.
-#include "gap/effect.hpp"
+#include "gap/effects/effect.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -13,8 +13,8 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "gap/drive.hpp"
-#include "gap/gap_rows.hpp"
+#include "gap/rows/drive.hpp"
+#include "gap/rows/gap_rows.hpp"
 
 namespace wheelwright::gap::catalogue_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: models whose expected losses are known, many times over.
-#include "gap/candidate.hpp"
+#include "gap/causes/candidate.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "gap/confidence.hpp"
+#include "gap/causes/confidence.hpp"
 
 namespace wheelwright::gap::confidence_test {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: columns of known angles.
-#include "gap/confusion.hpp"
+#include "gap/causes/confusion.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/QR>
 
-#include "gap/further_drive.hpp"
+#include "gap/next/further_drive.hpp"
 #include "tests/gap/noisy_log.hpp"
 
 namespace wheelwright::gap::confusion_test {

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "gap/drive.hpp"
 #include "gap/regimes.hpp"
+#include "gap/rows/drive.hpp"
 #include "model/robot.hpp"
 #include "tests/gap/made_up_drive.hpp"
 

@@ -11,11 +11,11 @@
 
 #include "commission/design/stages.hpp"
 #include "core/error.hpp"
-#include "gap/block_gram.hpp"
-#include "gap/discrimination_design.hpp"
-#include "gap/drive.hpp"
-#include "gap/effect.hpp"
-#include "gap/further_drive.hpp"
+#include "gap/effects/effect.hpp"
+#include "gap/next/discrimination_design.hpp"
+#include "gap/next/further_drive.hpp"
+#include "gap/rows/block_gram.hpp"
+#include "gap/rows/drive.hpp"
 #include "tests/design/robots.hpp"
 
 namespace wheelwright::gap::discrimination_test {

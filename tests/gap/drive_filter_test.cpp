@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracles: the convolution integral; RegressorFilter on the same log as the step goes to zero.
-#include "gap/drive.hpp"
+#include "gap/rows/drive.hpp"
 
 #include <array>
 #include <cmath>

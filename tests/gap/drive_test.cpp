@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gap/drive.hpp"
+#include "gap/rows/drive.hpp"
 
 #include <cmath>
 #include <vector>

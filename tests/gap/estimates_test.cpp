@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: the simulator's own numbers, and the axioms of Shapley's value.
-#include "gap/estimates.hpp"
+#include "gap/causes/estimates.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: a robot on a circle, whose chords are known in closed form.
-#include "gap/gap_rows.hpp"
+#include "gap/rows/gap_rows.hpp"
 
 #include <cmath>
 #include <random>

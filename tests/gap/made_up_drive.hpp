@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <random>
 
-#include "gap/drive.hpp"
+#include "gap/rows/drive.hpp"
 
 namespace wheelwright::gap::gap_example {
 

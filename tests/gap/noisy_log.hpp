@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "gap/causes/selection.hpp"
 #include "gap/prepared.hpp"
-#include "gap/selection.hpp"
 #include "tests/gap/simulated_gap.hpp"
 
 namespace wheelwright::gap::gap_example {

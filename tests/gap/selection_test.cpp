@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Oracle: the simulator, which knows what it did.
-#include "gap/selection.hpp"
+#include "gap/causes/selection.hpp"
 
 #include <algorithm>
 #include <cmath>

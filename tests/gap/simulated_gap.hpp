@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "gap/block_gram.hpp"
-#include "gap/effect.hpp"
-#include "gap/gap_rows.hpp"
+#include "gap/effects/effect.hpp"
+#include "gap/rows/block_gram.hpp"
+#include "gap/rows/gap_rows.hpp"
 #include "model/filter/measurement.hpp"
 #include "model/sim/simulation.hpp"
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "gap/simulator_change.hpp"
+#include "gap/write_back.hpp"
 #include "tests/gap/simulated_gap.hpp"
 
 namespace wheelwright::gap::simulator_change_test {

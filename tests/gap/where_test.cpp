@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "gap/drive.hpp"
+#include "gap/rows/drive.hpp"
 #include "gap/where.hpp"
 #include "tests/gap/made_up_drive.hpp"
 

@@ -13,7 +13,7 @@
 #include "core/error.hpp"
 #include "gap/diagnose.hpp"
 #include "gap/prepared.hpp"
-#include "gap/simulator_change.hpp"
+#include "gap/write_back.hpp"
 #include "reality/case.hpp"
 #include "reality/replay.hpp"
 #include "reality/signals.hpp"
