@@ -13,10 +13,10 @@
 #include "app/options.hpp"
 #include "commission/choice/detector_choice.hpp"
 #include "core/error.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "report/choice_report.hpp"
 #include "results/detection_json.hpp"
 #include "results/model_file.hpp"
-#include "robots/robot_file.hpp"
 #include "words/summary.hpp"
 
 namespace wheelwright::app {

@@ -8,7 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "core/error.hpp"
-#include "files/words.hpp"
+#include "formats/files/words.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -15,12 +15,12 @@
 #include "commission/commission.hpp"
 #include "commission/two_walks.hpp"
 #include "commission/watch/detector_walk.hpp"
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "report/commission_report.hpp"
 #include "report/page.hpp"
 #include "results/detection_json.hpp"
 #include "results/model_file.hpp"
-#include "robots/robot_file.hpp"
 #include "words/summary.hpp"
 
 namespace wheelwright::app {

@@ -19,11 +19,11 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
-#include "files/bytes.hpp"
-#include "files/words.hpp"
-#include "logs/bag_files.hpp"
-#include "logs/csv.hpp"
-#include "logs/recorded_log.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/words.hpp"
+#include "formats/logs/bag_files.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/logs/recorded_log.hpp"
 #include "model/robot.hpp"
 #include "report/signals.hpp"
 

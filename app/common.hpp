@@ -21,15 +21,15 @@
 #include "app/commands.hpp"
 #include "core/error.hpp"
 #include "detector/detector.hpp"
-#include "files/bytes.hpp"
-#include "files/json.hpp"
-#include "files/temporary.hpp"
-#include "files/words.hpp"
-#include "logs/log_file.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/json.hpp"
+#include "formats/files/temporary.hpp"
+#include "formats/files/words.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "report/commission_report.hpp"
 #include "report/page.hpp"
 #include "results/software.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::app {
 

@@ -10,9 +10,9 @@
 #include "app/options.hpp"
 #include "commission/model_comparison.hpp"
 #include "core/words.hpp"
+#include "formats/robots/online_model_file.hpp"
 #include "report/comparison_report.hpp"
 #include "results/comparison_json.hpp"
-#include "robots/online_model_file.hpp"
 #include "words/comparison_words.hpp"
 
 namespace wheelwright::app {

@@ -10,7 +10,7 @@
 #include "app/common.hpp"
 #include "app/options.hpp"
 #include "core/error.hpp"
-#include "logs/log_file.hpp"
+#include "formats/logs/log_file.hpp"
 
 namespace wheelwright::app {
 namespace convert_command {

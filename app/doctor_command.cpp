@@ -10,9 +10,9 @@
 #include "app/common.hpp"
 #include "app/options.hpp"
 #include "commission/doctor/log_health.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "report/health_report.hpp"
 #include "results/health_json.hpp"
-#include "robots/robot_file.hpp"
 #include "words/summary.hpp"
 
 namespace wheelwright::app {

@@ -2,8 +2,8 @@
 #include "app/drive_files.hpp"
 
 #include "commission/design/plan.hpp"
-#include "logs/csv.hpp"
-#include "logs/velocity_commands.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/logs/velocity_commands.hpp"
 
 namespace wheelwright::app {
 

@@ -10,7 +10,7 @@
 #include "app/options.hpp"
 #include "commission/watch/risk_watch.hpp"
 #include "detector/export/export_c.hpp"
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
 #include "results/model_file.hpp"
 #include "results/model_json.hpp"
 

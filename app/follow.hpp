@@ -7,7 +7,7 @@
 
 #include "app/common.hpp"
 #include "commission/commission.hpp"
-#include "logs/csv_format.hpp"
+#include "formats/logs/csv_format.hpp"
 
 namespace wheelwright::app {
 

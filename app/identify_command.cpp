@@ -12,10 +12,10 @@
 #include "app/options.hpp"
 #include "app/sound_log.hpp"
 #include "core/error.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "identify/inference/identification.hpp"
 #include "report/identify_report.hpp"
 #include "results/identification_json.hpp"
-#include "robots/robot_file.hpp"
 #include "words/identification_words.hpp"
 #include "words/summary.hpp"
 

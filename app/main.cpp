@@ -24,7 +24,7 @@
 #include "app/common.hpp"
 #include "app/options.hpp"
 #include "core/error.hpp"
-#include "files/temporary.hpp"
+#include "formats/files/temporary.hpp"
 
 namespace {
 

@@ -13,7 +13,7 @@
 
 #include "app/units.hpp"
 #include "core/error.hpp"
-#include "files/words.hpp"
+#include "formats/files/words.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -9,11 +9,11 @@
 #include "app/commands.hpp"
 #include "app/common.hpp"
 #include "app/options.hpp"
-#include "files/bytes.hpp"
-#include "robots/controller_file.hpp"
-#include "robots/robot_description.hpp"
-#include "robots/robot_file.hpp"
-#include "robots/robot_origin.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/robots/controller_file.hpp"
+#include "formats/robots/robot_description.hpp"
+#include "formats/robots/robot_file.hpp"
+#include "formats/robots/robot_origin.hpp"
 
 namespace wheelwright::app {
 namespace robot_command {

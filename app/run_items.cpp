@@ -18,8 +18,8 @@
 
 #include <fmt/format.h>
 
-#include "files/bytes.hpp"
-#include "files/words.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/words.hpp"
 
 namespace wheelwright::app {
 

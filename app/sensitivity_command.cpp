@@ -10,10 +10,10 @@
 #include "app/common.hpp"
 #include "app/options.hpp"
 #include "app/run_items.hpp"
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "report/sensitivity_report.hpp"
 #include "results/study_json.hpp"
-#include "robots/robot_file.hpp"
 #include "study/study_work.hpp"
 #include "words/summary.hpp"
 

@@ -13,8 +13,8 @@
 #include "commission/physical.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/limits.hpp"
-#include "files/json.hpp"
-#include "logs/log_file.hpp"
+#include "formats/files/json.hpp"
+#include "formats/logs/log_file.hpp"
 #include "words/text.hpp"
 
 namespace wheelwright::app {

@@ -12,8 +12,8 @@
 #include "app/common.hpp"
 #include "app/manual.hpp"
 #include "app/options.hpp"
-#include "files/bytes.hpp"
-#include "files/words.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/words.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
-#include "files/json.hpp"
-#include "logs/log_file.hpp"
+#include "formats/files/json.hpp"
+#include "formats/logs/log_file.hpp"
 #include "model/sim/simulation.hpp"
 #include "results/scenario_file.hpp"
 

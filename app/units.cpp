@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/error.hpp"
-#include "files/words.hpp"
+#include "formats/files/words.hpp"
 
 namespace wheelwright::app {
 namespace {

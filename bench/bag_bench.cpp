@@ -12,9 +12,9 @@
 #include "bench/bench.hpp"
 #include "bench/temporary_file.hpp"
 #include "core/error.hpp"
-#include "logs/bag.hpp"
-#include "logs/bag_write.hpp"
-#include "logs/ros_messages.hpp"
+#include "formats/logs/bag.hpp"
+#include "formats/logs/bag_write.hpp"
+#include "formats/logs/ros_messages.hpp"
 
 namespace wheelwright::bench::bag_bench {
 namespace {

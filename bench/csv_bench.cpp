@@ -12,8 +12,8 @@
 #include "bench/bench.hpp"
 #include "bench/temporary_file.hpp"
 #include "core/error.hpp"
-#include "files/bytes.hpp"
-#include "logs/csv.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/logs/csv.hpp"
 
 namespace wheelwright::bench::csv_bench {
 namespace {

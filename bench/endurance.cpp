@@ -35,8 +35,8 @@
 #include "detector/export/export_c.hpp"
 #include "detector/multiscale/scale_detector.hpp"
 #include "detector/online_model.hpp"
-#include "logs/csv.hpp"
-#include "robots/online_model_file.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/robots/online_model_file.hpp"
 
 using namespace wheelwright;
 

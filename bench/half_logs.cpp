@@ -20,9 +20,9 @@
 #include "commission/commission.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
-#include "logs/csv.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "model/filter/row_stream.hpp"
-#include "robots/robot_file.hpp"
 
 using namespace wheelwright;
 

@@ -32,9 +32,9 @@
 #include "commission/commission.hpp"
 #include "core/error.hpp"
 #include "detector/faults/margins.hpp"
-#include "logs/csv.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "model/sim/simulation.hpp"
-#include "robots/robot_file.hpp"
 
 using namespace wheelwright;
 

@@ -14,7 +14,7 @@
 #include "bench/bench.hpp"
 #include "bench/temporary_file.hpp"
 #include "core/error.hpp"
-#include "logs/mcap.hpp"
+#include "formats/logs/mcap.hpp"
 
 namespace wheelwright::bench::mcap_bench {
 namespace {

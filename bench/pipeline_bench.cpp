@@ -24,8 +24,8 @@
 #include "commission/commission.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
+#include "formats/logs/csv.hpp"
 #include "identify/least_squares.hpp"
-#include "logs/csv.hpp"
 #include "model/filter/row_stream.hpp"
 #include "model/sim/simulation.hpp"
 

@@ -2,8 +2,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/log.hpp"
+#include "formats/logs/recorded_log.hpp"
 #include "fuzz/fuzz.hpp"
-#include "logs/recorded_log.hpp"
 #include "results/comparison_json.hpp"
 #include "results/model_check.hpp"
 #include "results/model_file.hpp"

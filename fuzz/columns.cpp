@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
+#include "formats/logs/log_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "fuzz/fuzz.hpp"
-#include "logs/log_file.hpp"
-#include "robots/robot_file.hpp"
 
 using namespace wheelwright;
 

@@ -3,10 +3,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/robots/controller_file.hpp"
+#include "formats/robots/robot_file.hpp"
+#include "formats/robots/robot_origin.hpp"
 #include "fuzz/fuzz.hpp"
-#include "robots/controller_file.hpp"
-#include "robots/robot_file.hpp"
-#include "robots/robot_origin.hpp"
 
 using namespace wheelwright;
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
 #include "fuzz/log.hpp"
 
 using namespace wheelwright;

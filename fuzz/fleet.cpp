@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <set>
 
+#include "formats/robots/fleet_list.hpp"
 #include "fuzz/fuzz.hpp"
-#include "robots/fleet_list.hpp"
 
 using namespace wheelwright;
 

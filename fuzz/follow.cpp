@@ -4,9 +4,9 @@
 #include <cstring>
 #include <memory>
 
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/logs/csv.hpp"
 #include "fuzz/fuzz.hpp"
-#include "logs/csv.hpp"
 
 using namespace wheelwright;
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "formats/logs/log_file.hpp"
 #include "fuzz/log.hpp"
-#include "logs/log_file.hpp"
 
 using namespace wheelwright;
 

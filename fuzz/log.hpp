@@ -10,9 +10,9 @@
 #include <string>
 
 #include "core/log.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/logs/log_file.hpp"
 #include "fuzz/fuzz.hpp"
-#include "logs/csv.hpp"
-#include "logs/log_file.hpp"
 
 namespace wheelwright::fuzz {
 

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "formats/logs/ros_messages.hpp"
 #include "fuzz/fuzz.hpp"
-#include "logs/ros_messages.hpp"
 
 using namespace wheelwright;
 

@@ -2,8 +2,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "formats/logs/bag_files.hpp"
 #include "fuzz/fuzz.hpp"
-#include "logs/bag_files.hpp"
 
 using namespace wheelwright;
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
 #include "fuzz/fuzz.hpp"
 
 using namespace wheelwright;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
+#include "formats/robots/robot_file.hpp"
 #include "fuzz/fuzz.hpp"
-#include "robots/robot_file.hpp"
 
 using namespace wheelwright;
 

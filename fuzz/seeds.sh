@@ -304,20 +304,20 @@ words() {
   (cd "$house" && grep -oh '"[A-Za-z_][A-Za-z_0-9.]*"' "$@") | sort -u > "$dictionary"
 }
 for name in csv follow; do
-  sed -n 's/@/r/; s/^ *{\("[a-z_]*"\), .*/\1/p' "$house/logs/recorded_log.cpp" | sort -u > $name.dict
+  sed -n 's/@/r/; s/^ *{\("[a-z_]*"\), .*/\1/p' "$house/formats/logs/recorded_log.cpp" | sort -u > $name.dict
   printf '"tau_l"\n"1e308"\n"nan"\n"inf"\n"-"\n"\\""\n' >> $name.dict
 done
-words model robots/online_model_file.cpp robots/robot_keys.cpp results/model_file.cpp
-words messages logs/ros_definition.cpp
-words robot robots/robot_keys.cpp robots/robot_file.cpp
-words urdf robots/robot_description.cpp robots/wheel_geometry.cpp robots/robot_origin.cpp robots/controller_file.cpp
-words controllers robots/controller_file.cpp
+words model formats/robots/online_model_file.cpp formats/robots/robot_keys.cpp results/model_file.cpp
+words messages formats/logs/ros_definition.cpp
+words robot formats/robots/robot_keys.cpp formats/robots/robot_file.cpp
+words urdf formats/robots/robot_description.cpp formats/robots/wheel_geometry.cpp formats/robots/robot_origin.cpp formats/robots/controller_file.cpp
+words controllers formats/robots/controller_file.cpp
 cp model.dict claims.dict
-words columns robots/robot_keys.cpp
+words columns formats/robots/robot_keys.cpp
 words gap results/gap_json.cpp gap/effects/catalogue_actuator.cpp gap/effects/catalogue_friction.cpp gap/effects/catalogue_geometry.cpp
 words record results/fleet_json.cpp
-words simulator robots/mjcf_document.cpp robots/sdf_document.cpp robots/urdf_document.cpp
-words scenario results/scenario_file.cpp robots/robot_keys.cpp
+words simulator formats/robots/mjcf_document.cpp formats/robots/sdf_document.cpp formats/robots/urdf_document.cpp
+words scenario results/scenario_file.cpp formats/robots/robot_keys.cpp
 printf '"rosbag2_bagfile_information"\n"relative_file_paths"\n"files"\n"message_count"\n"../"\n"/"\n' > metadata.dict
 printf '"robot"\n"log"\n"when"\n"robot_file"\n"role"\n"commission"\n"check"\n"2026-03-01"\n' > fleet.dict
 words study results/study_json.cpp study/study_case.cpp study/study_quantity.cpp

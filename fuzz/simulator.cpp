@@ -3,8 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/robots/simulator_file.hpp"
 #include "fuzz/fuzz.hpp"
-#include "robots/simulator_file.hpp"
 
 using namespace wheelwright;
 

@@ -3,8 +3,8 @@
 #include <map>
 #include <string>
 
+#include "formats/logs/database.hpp"
 #include "fuzz/fuzz.hpp"
-#include "logs/database.hpp"
 #include "results/result_store.hpp"
 
 using namespace wheelwright;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
+#include "formats/robots/robot_description.hpp"
+#include "formats/robots/robot_file.hpp"
+#include "formats/robots/robot_origin.hpp"
 #include "fuzz/fuzz.hpp"
-#include "robots/robot_description.hpp"
-#include "robots/robot_file.hpp"
-#include "robots/robot_origin.hpp"
 
 using namespace wheelwright;
 

@@ -15,8 +15,8 @@
 #include "core/check.hpp"
 #include "core/log.hpp"
 #include "core/regression.hpp"
-#include "logs/csv_format.hpp"
-#include "logs/recorded_log.hpp"
+#include "formats/logs/csv_format.hpp"
+#include "formats/logs/recorded_log.hpp"
 
 namespace wheelwright::python {
 

@@ -7,14 +7,14 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
-#include "logs/log_file.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "python/arrays.hpp"
 #include "python/module.hpp"
 #include "results/detection_json.hpp"
 #include "results/model_file.hpp"
 #include "results/model_json.hpp"
 #include "results/software.hpp"
-#include "robots/robot_file.hpp"
 #include "words/summary.hpp"
 
 namespace wheelwright::python {

@@ -11,11 +11,11 @@
 #include "commission/margin_survey.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/check.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "python/arrays.hpp"
 #include "python/module.hpp"
 #include "results/detection_json.hpp"
 #include "results/software.hpp"
-#include "robots/robot_file.hpp"
 #include "words/detect_words.hpp"
 #include "words/summary.hpp"
 

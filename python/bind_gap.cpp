@@ -7,16 +7,16 @@
 #include <nlohmann/json.hpp>
 
 #include "core/check.hpp"
-#include "files/words.hpp"
+#include "formats/files/words.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "gap/diagnose.hpp"
 #include "gap/effects/effect.hpp"
 #include "gap/next/further_drive.hpp"
-#include "logs/log_file.hpp"
 #include "python/arrays.hpp"
 #include "python/module.hpp"
 #include "results/gap_json.hpp"
 #include "results/software.hpp"
-#include "robots/robot_file.hpp"
 #include "words/gap_words.hpp"
 
 namespace wheelwright::python {

@@ -12,6 +12,7 @@
 #include "commission/design/manoeuvre.hpp"
 #include "commission/design/stages.hpp"
 #include "core/check.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "gap/effects/effect.hpp"
 #include "gap/next/discrimination_design.hpp"
 #include "gap/next/named_rivals.hpp"
@@ -22,7 +23,6 @@
 #include "results/gap_json.hpp"
 #include "results/scenario_file.hpp"
 #include "results/software.hpp"
-#include "robots/robot_file.hpp"
 #include "words/summary.hpp"
 
 namespace wheelwright::python {

@@ -10,14 +10,14 @@
 #include <nlohmann/json.hpp>
 
 #include "core/check.hpp"
+#include "formats/robots/fleet_list.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "python/arrays.hpp"
 #include "python/module.hpp"
 #include "results/fleet_json.hpp"
 #include "results/fleet_logs.hpp"
 #include "results/software.hpp"
 #include "results/study_json.hpp"
-#include "robots/fleet_list.hpp"
-#include "robots/robot_file.hpp"
 #include "study/study_work.hpp"
 #include "words/summary.hpp"
 

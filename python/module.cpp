@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/check.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "results/software.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::python {
 

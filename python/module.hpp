@@ -27,11 +27,11 @@
 #include "commission/commission.hpp"
 #include "core/log.hpp"
 #include "detector/detector.hpp"
-#include "files/json.hpp"
-#include "logs/log_file.hpp"
-#include "logs/recorded_log.hpp"
+#include "formats/files/json.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/logs/recorded_log.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "model/robot.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::python {
 

@@ -16,10 +16,10 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.hpp"
-#include "files/bytes.hpp"
-#include "files/json.hpp"
-#include "logs/csv.hpp"
-#include "logs/log_file.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/json.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/logs/log_file.hpp"
 #include "reality/case.hpp"
 #include "reality/replay.hpp"
 

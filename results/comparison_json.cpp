@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "robots/online_model_file.hpp"
+#include "formats/robots/online_model_file.hpp"
 #include "words/comparison_words.hpp"
 
 namespace wheelwright::results {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "commission/model_comparison.hpp"
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
 
 namespace wheelwright::results {
 

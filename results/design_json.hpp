@@ -7,7 +7,7 @@
 
 #include "commission/design/detection.hpp"
 #include "commission/design/manoeuvre.hpp"
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
 #include "gap/next/discrimination_design.hpp"
 
 namespace wheelwright::results {

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
 #include "results/model_json.hpp"
 #include "words/detect_words.hpp"
 

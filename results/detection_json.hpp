@@ -14,7 +14,7 @@
 #include "commission/watch/detector_walk.hpp"
 #include "commission/watch/incident_watch.hpp"
 #include "commission/watch/risk_watch.hpp"
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
 
 namespace wheelwright::results {
 

@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "files/words.hpp"
+#include "formats/files/words.hpp"
+#include "formats/robots/online_model_file.hpp"
 #include "results/model_json.hpp"
-#include "robots/online_model_file.hpp"
 
 namespace wheelwright::results {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
 #include "study/fleet_result.hpp"
 #include "study/population.hpp"
 

@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 
 #include "core/error.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "results/health_json.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 

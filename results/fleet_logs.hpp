@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "commission/doctor/log_health.hpp"
-#include "logs/log_file.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/robots/fleet_list.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "model/robot.hpp"
-#include "robots/fleet_list.hpp"
-#include "robots/robot_file.hpp"
 #include "study/examine_robot.hpp"
 
 namespace wheelwright::results {

@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.hpp"
-#include "files/bytes.hpp"
-#include "files/json.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/json.hpp"
 #include "gap/where.hpp"
 
 namespace wheelwright::results {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
 #include "gap/diagnosis.hpp"
 #include "gap/next/discrimination.hpp"
 #include "gap/next/further_drive.hpp"

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "commission/doctor/log_health.hpp"
-#include "files/json.hpp"
-#include "logs/recorded_log.hpp"
+#include "formats/files/json.hpp"
+#include "formats/logs/recorded_log.hpp"
 
 namespace wheelwright::results {
 

@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "commission/physical.hpp"
-#include "files/words.hpp"
+#include "formats/files/words.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "results/model_json.hpp"
-#include "robots/robot_file.hpp"
 #include "words/identification_words.hpp"
 
 namespace wheelwright::results {

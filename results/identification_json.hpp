@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <string>
 
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
+#include "formats/logs/recorded_log.hpp"
 #include "identify/estimate.hpp"
 #include "identify/inference/identification.hpp"
-#include "logs/recorded_log.hpp"
 
 namespace wheelwright::results {
 

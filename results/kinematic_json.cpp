@@ -5,12 +5,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "files/json.hpp"
-#include "files/words.hpp"
+#include "formats/files/json.hpp"
+#include "formats/files/words.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "results/identification_json.hpp"
 #include "results/model_file.hpp"
 #include "results/model_json.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 namespace {

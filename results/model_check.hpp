@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
 #include "results/model_file.hpp"
 #include "results/set_check.hpp"
 

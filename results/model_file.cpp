@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/limits.hpp"
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "results/model_json.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "commission/commission.hpp"
-#include "files/json.hpp"
-#include "logs/recorded_log.hpp"
-#include "robots/online_model_file.hpp"
+#include "formats/files/json.hpp"
+#include "formats/logs/recorded_log.hpp"
+#include "formats/robots/online_model_file.hpp"
 
 namespace wheelwright::results {
 

@@ -11,11 +11,11 @@
 #include <nlohmann/json.hpp>
 
 #include "commission/physical.hpp"
-#include "files/json.hpp"
-#include "files/words.hpp"
+#include "formats/files/json.hpp"
+#include "formats/files/words.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "results/identification_json.hpp"
 #include "results/model_file.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 

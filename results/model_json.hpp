@@ -10,10 +10,10 @@
 #include "commission/commission.hpp"
 #include "commission/kinematic.hpp"
 #include "core/warrant.hpp"
-#include "files/json.hpp"
-#include "files/words.hpp"
+#include "formats/files/json.hpp"
+#include "formats/files/words.hpp"
+#include "formats/robots/robot_keys.hpp"
 #include "model/filter/error_class.hpp"
-#include "robots/robot_keys.hpp"
 
 namespace wheelwright::results {
 

@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 
 #include "core/check.hpp"
-#include "files/words.hpp"
-#include "logs/database.hpp"
+#include "formats/files/words.hpp"
+#include "formats/logs/database.hpp"
 
 namespace wheelwright::results {
 namespace {

@@ -13,11 +13,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include "core/error.hpp"
-#include "files/bytes.hpp"
-#include "files/place.hpp"
-#include "logs/csv.hpp"
-#include "robots/robot_file.hpp"
-#include "robots/robot_keys.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/place.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/robots/robot_file.hpp"
+#include "formats/robots/robot_keys.hpp"
 
 namespace wheelwright::results {
 

@@ -10,13 +10,13 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.hpp"
-#include "files/bytes.hpp"
-#include "files/json.hpp"
-#include "files/place.hpp"
-#include "logs/log_file.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/json.hpp"
+#include "formats/files/place.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "results/model_json.hpp"
 #include "results/scenario_file.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::results {
 

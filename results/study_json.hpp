@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
 #include "model/robot.hpp"
 #include "study/bound_derivatives.hpp"
 #include "study/study.hpp"

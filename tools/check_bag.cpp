@@ -15,9 +15,9 @@
 #include <fmt/format.h>
 
 #include "core/error.hpp"
-#include "logs/bag.hpp"
-#include "logs/bag_write.hpp"
-#include "logs/ros_messages.hpp"
+#include "formats/logs/bag.hpp"
+#include "formats/logs/bag_write.hpp"
+#include "formats/logs/ros_messages.hpp"
 
 namespace {
 

@@ -11,8 +11,8 @@ trap 'rm -rf "$scratch"' EXIT
 command -v npm >/dev/null || { echo "bag: npm is missing" >&2; exit 2; }
 
 "${CXX:-g++}" -std=c++20 -O1 -iquote . $(pkg-config --cflags eigen3) -o "$scratch/check_bag" \
-  tools/check_bag.cpp logs/ros_*.cpp logs/mcap_*.cpp logs/bag.cpp logs/bag_files.cpp logs/bag_storage.cpp logs/bag_write.cpp \
-  logs/database.cpp files/bytes.cpp files/words.cpp core/words.cpp -lfmt -lz -lzstd -llz4 -lxxhash -lsqlite3 -lfastcdr -lyaml-cpp
+  tools/check_bag.cpp logs/ros_*.cpp logs/mcap_*.cpp formats/logs/bag.cpp formats/logs/bag_files.cpp formats/logs/bag_storage.cpp formats/logs/bag_write.cpp \
+  formats/logs/database.cpp formats/files/bytes.cpp formats/files/words.cpp core/words.cpp -lfmt -lz -lzstd -llz4 -lxxhash -lsqlite3 -lfastcdr -lyaml-cpp
 cp tools/check_bag.mjs "$scratch"
 cd "$scratch"
 npm install --silent --no-audit --no-fund --ignore-scripts @mcap/core@2.2.2 @foxglove/wasm-zstd@1.0.1 \

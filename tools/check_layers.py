@@ -23,10 +23,10 @@ LAYERS = [
         "detector": "detector",
     }),
     ("formats", {
-        "files": "files",
-        "logs": "logs",
+        "files": "formats/files",
+        "logs": "formats/logs",
         "sim": "model/sim",
-        "robots": "robots",
+        "robots": "formats/robots",
     }),
     ("commissioning", {
         "identify": "identify",

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "core/error.hpp"
-#include "logs/mcap.hpp"
+#include "formats/logs/mcap.hpp"
 
 namespace {
 

@@ -10,7 +10,7 @@ trap 'rm -rf "$scratch"' EXIT
 command -v npm >/dev/null || { echo "mcap: npm is missing" >&2; exit 2; }
 
 "${CXX:-g++}" -std=c++20 -O1 -iquote . -o "$scratch/check_mcap" tools/check_mcap.cpp logs/mcap_*.cpp \
-  files/bytes.cpp files/words.cpp -lfmt -lz -lzstd -llz4 -lxxhash
+  formats/files/bytes.cpp formats/files/words.cpp -lfmt -lz -lzstd -llz4 -lxxhash
 cp tools/check_mcap.mjs "$scratch"
 cd "$scratch"
 npm install --silent --no-audit --no-fund --ignore-scripts @mcap/core@2.2.2 @foxglove/wasm-lz4@1.0.2 \

@@ -20,10 +20,10 @@
 
 #include "core/error.hpp"
 #include "core/log.hpp"
-#include "files/bytes.hpp"
-#include "logs/log_file.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "model/sim/simulation.hpp"
-#include "robots/robot_file.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // wheelwright export: the header of a commissioned model decides as `wheelwright detect` does, and bad wishes are told.
-#include "logs/csv.hpp"
+#include "formats/logs/csv.hpp"
 #include "results/model_file.hpp"
 #include "tests/app/program.hpp"
 #include "tests/support/c_detector.hpp"

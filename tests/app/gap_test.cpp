@@ -2,7 +2,7 @@
 // `wheelwright gap`, as a user runs it: a simulated robot whose bearings are dry, its plain robot file, a healthy log.
 #include <algorithm>
 
-#include "robots/robot_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "tests/app/program.hpp"
 #include "tests/robots/simulator_samples.hpp"
 

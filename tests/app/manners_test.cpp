@@ -6,7 +6,7 @@
 
 #include "app/common.hpp"
 #include "app/units.hpp"
-#include "files/words.hpp"
+#include "formats/files/words.hpp"
 #include "tests/app/program.hpp"
 
 namespace wheelwright::app::manners_test {

@@ -9,8 +9,8 @@
 
 #include <rapidcheck.h>
 
-#include "logs/log_file.hpp"
-#include "logs/recorded_log.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/logs/recorded_log.hpp"
 #include "tests/app/program.hpp"
 
 namespace wheelwright::app::metamorphic_test {

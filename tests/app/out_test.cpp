@@ -5,7 +5,7 @@
 #include <chrono>
 #include <thread>
 
-#include "files/temporary.hpp"
+#include "formats/files/temporary.hpp"
 #include "tests/app/program.hpp"
 
 namespace wheelwright::app::out_test {

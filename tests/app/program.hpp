@@ -16,8 +16,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "files/bytes.hpp"
-#include "files/json.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/json.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/skip.hpp"
 

@@ -2,7 +2,7 @@
 // wheelwright robot: where the file goes, what stands in it, and what is never written over.
 #include "tests/app/program.hpp"
 
-#include "robots/robot_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "tests/robots/robot_samples.hpp"
 
 namespace wheelwright::app::robot_test {

@@ -8,7 +8,7 @@
 #include <functional>
 #include <thread>
 
-#include "files/temporary.hpp"
+#include "formats/files/temporary.hpp"
 #include "tests/app/program.hpp"
 
 namespace wheelwright::app::robust_test {

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-#include "robots/robot_file.hpp"
+#include "formats/robots/robot_file.hpp"
 
 namespace wheelwright::app::try_test {
 namespace {

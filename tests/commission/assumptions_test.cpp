@@ -8,7 +8,7 @@
 
 #include "commission/assumptions.hpp"
 #include "commission/commission.hpp"
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
 #include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::assumptions_test {

@@ -12,9 +12,9 @@
 #include "commission/contradictions.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "identify/inference/identification.hpp"
-#include "logs/csv.hpp"
-#include "robots/robot_file.hpp"
 #include "tests/support/skip.hpp"
 
 namespace wheelwright::commission::slow_recordings_test {

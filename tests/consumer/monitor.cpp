@@ -12,7 +12,7 @@
 
 #include <wheelwright/core/error.hpp>
 #include <wheelwright/detector/online_model.hpp>
-#include <wheelwright/robots/online_model_file.hpp>
+#include <wheelwright/formats/robots/online_model_file.hpp>
 
 namespace {
 

@@ -11,10 +11,10 @@
 #include <gtest/gtest.h>
 
 #include "commission/doctor/log_health.hpp"
-#include "logs/csv.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "model/sim/simulation.hpp"
 #include "results/health_json.hpp"
-#include "robots/robot_file.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/kinematic_drives.hpp"
 #include "tests/support/skip.hpp"

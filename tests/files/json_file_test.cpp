@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "files/json.hpp"
+#include "formats/files/json.hpp"
 
 #include <bit>
 #include <cmath>

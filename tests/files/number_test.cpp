@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "files/words.hpp"
+#include "formats/files/words.hpp"
 
 #include <bit>
 #include <cmath>

@@ -6,8 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "files/json.hpp"
-#include "files/words.hpp"
+#include "formats/files/json.hpp"
+#include "formats/files/words.hpp"
 
 namespace wheelwright::files::printable_test {
 namespace {

@@ -14,8 +14,8 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "files/bytes.hpp"
-#include "files/temporary.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/temporary.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace wheelwright::files::temporary_test {

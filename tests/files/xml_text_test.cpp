@@ -6,8 +6,8 @@
 #include <string>
 
 #include "core/error.hpp"
-#include "files/place.hpp"
-#include "files/xml_text.hpp"
+#include "formats/files/place.hpp"
+#include "formats/files/xml_text.hpp"
 
 namespace wheelwright::files::xml_text_test {
 namespace {

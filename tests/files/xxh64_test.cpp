@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
 
 #include <algorithm>
 #include <cstdint>

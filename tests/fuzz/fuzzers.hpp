@@ -15,7 +15,7 @@
 #include <string_view>
 #include <vector>
 
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
 
 /// Entry point of a fuzzer, each under a name of its own (tests/CMakeLists.txt).
 using Fuzzer = int(const std::uint8_t* data, std::size_t size);

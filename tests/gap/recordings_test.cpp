@@ -9,9 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "formats/logs/csv.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "gap/diagnose.hpp"
-#include "logs/csv.hpp"
-#include "robots/robot_file.hpp"
 #include "tests/support/skip.hpp"
 
 namespace wheelwright::gap::recordings_test {

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
+#include "formats/logs/csv.hpp"
 #include "identify/inference/kinematic_calibration.hpp"
-#include "logs/csv.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/skip.hpp"
 

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "logs/bag_log.hpp"
+#include "formats/logs/bag_log.hpp"
 
 namespace wheelwright::logs::bag_clock_test {
 namespace {

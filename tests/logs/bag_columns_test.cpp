@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "logs/bag_log.hpp"
+#include "formats/logs/bag_log.hpp"
 
 namespace wheelwright::logs::bag_columns_test {
 namespace {

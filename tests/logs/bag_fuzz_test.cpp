@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "logs/ros_messages.hpp"
+#include "formats/logs/ros_messages.hpp"
 #include "tests/logs/bag_samples.hpp"
 #include "tests/support/scratch.hpp"
 

@@ -12,7 +12,7 @@
 #include <sqlite3.h>
 #include <zstd.h>
 
-#include "logs/bag.hpp"
+#include "formats/logs/bag.hpp"
 #include "tests/logs/ros_cdr.hpp"
 
 namespace wheelwright::testing {

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "files/bytes.hpp"
-#include "logs/bag.hpp"
-#include "logs/bag_write.hpp"
-#include "logs/mcap.hpp"
-#include "logs/ros_messages.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/logs/bag.hpp"
+#include "formats/logs/bag_write.hpp"
+#include "formats/logs/mcap.hpp"
+#include "formats/logs/ros_messages.hpp"
 #include "tests/logs/bag_samples.hpp"
 #include "tests/support/scratch.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tables that are not what they look like: other units, clocks and headers. What is not read is said.
-#include "logs/csv.hpp"
+#include "formats/logs/csv.hpp"
 
 #include <cmath>
 #include <functional>

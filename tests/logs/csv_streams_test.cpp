@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "logs/csv.hpp"
+#include "formats/logs/csv.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::csv_streams_test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "logs/csv.hpp"
+#include "formats/logs/csv.hpp"
 
 #include <algorithm>
 #include <cmath>

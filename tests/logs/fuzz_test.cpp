@@ -6,8 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "logs/csv.hpp"
-#include "robots/robot_file.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::fuzz_test {

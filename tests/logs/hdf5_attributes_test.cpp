@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What attributes, dimensions and places of datasets say of the columns of an HDF5 log.
-#include "logs/hdf5_log.hpp"
+#include "formats/logs/hdf5_log.hpp"
 
 #include <cmath>
 #include <functional>
@@ -12,8 +12,8 @@
 #include <hdf5.h>
 
 #include "core/error.hpp"
-#include "logs/log_file.hpp"
-#include "logs/recorded_log.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/logs/recorded_log.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::hdf5_attributes_test {

@@ -16,11 +16,11 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-#include "logs/bag_log.hpp"
-#include "logs/database.hpp"
-#include "logs/hdf5_log.hpp"
-#include "logs/log_file.hpp"
-#include "logs/mcap_format.hpp"
+#include "formats/logs/bag_log.hpp"
+#include "formats/logs/database.hpp"
+#include "formats/logs/hdf5_log.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/logs/mcap_format.hpp"
 #include "tests/logs/bag_samples.hpp"
 #include "tests/support/scratch.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "logs/log_file.hpp"
-#include "robots/robot_file.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/robots/robot_file.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,11 +14,11 @@
 #include <vector>
 
 #include "core/error.hpp"
-#include "logs/bag_write.hpp"
-#include "logs/csv.hpp"
-#include "logs/hdf5_log.hpp"
-#include "logs/ros_messages.hpp"
-#include "logs/row_log.hpp"
+#include "formats/logs/bag_write.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/logs/hdf5_log.hpp"
+#include "formats/logs/ros_messages.hpp"
+#include "formats/logs/row_log.hpp"
 
 #include <hdf5.h>
 

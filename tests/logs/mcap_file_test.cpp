@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "files/bytes.hpp"
+#include "formats/files/bytes.hpp"
 #include "tests/logs/mcap_samples.hpp"
 #include "tests/support/scratch.hpp"
 

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "logs/mcap.hpp"
+#include "formats/logs/mcap.hpp"
 
 namespace wheelwright::testing {
 

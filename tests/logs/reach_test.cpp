@@ -10,8 +10,8 @@
 #include <hdf5.h>
 #include <sqlite3.h>
 
-#include "logs/database.hpp"
-#include "logs/log_file.hpp"
+#include "formats/logs/database.hpp"
+#include "formats/logs/log_file.hpp"
 #include "tests/logs/bag_samples.hpp"
 #include "tests/support/scratch.hpp"
 

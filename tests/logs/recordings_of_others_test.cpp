@@ -10,11 +10,11 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "logs/bag_log.hpp"
-#include "logs/bag_write.hpp"
-#include "logs/log_file.hpp"
-#include "logs/ros_messages.hpp"
-#include "logs/row_log.hpp"
+#include "formats/logs/bag_log.hpp"
+#include "formats/logs/bag_write.hpp"
+#include "formats/logs/log_file.hpp"
+#include "formats/logs/ros_messages.hpp"
+#include "formats/logs/row_log.hpp"
 #include "tests/logs/ros_cdr.hpp"
 #include "tests/support/scratch.hpp"
 

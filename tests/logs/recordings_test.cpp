@@ -7,8 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "logs/csv.hpp"
-#include "robots/robot_file.hpp"
+#include "formats/logs/csv.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "tests/support/skip.hpp"
 
 namespace wheelwright::logs::recordings_test {

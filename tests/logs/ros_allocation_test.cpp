@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "logs/ros_messages.hpp"
+#include "formats/logs/ros_messages.hpp"
 #include "tests/logs/ros_cdr.hpp"
 
 namespace wheelwright::logs::ros_allocation_test {

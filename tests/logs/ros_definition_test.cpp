@@ -3,7 +3,7 @@
 #include <random>
 #include <string>
 
-#include "logs/ros_messages.hpp"
+#include "formats/logs/ros_messages.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace wheelwright::logs::ros_definition_test {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "logs/bag_write.hpp"
-#include "logs/ros_messages.hpp"
+#include "formats/logs/bag_write.hpp"
+#include "formats/logs/ros_messages.hpp"
 #include "tests/logs/ros_cdr.hpp"
 #include "tests/support/scratch.hpp"
 

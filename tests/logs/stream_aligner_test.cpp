@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "logs/row_log.hpp"
+#include "formats/logs/row_log.hpp"
 
 namespace wheelwright::logs::stream_aligner_test {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Commands as a recording: byte for byte what CDR laid down by hand says.
-#include "logs/velocity_commands.hpp"
+#include "formats/logs/velocity_commands.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
-#include "logs/mcap.hpp"
+#include "formats/logs/mcap.hpp"
 #include "tests/logs/ros_cdr.hpp"
 #include "tests/support/scratch.hpp"
 

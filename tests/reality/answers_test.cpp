@@ -15,9 +15,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "formats/robots/robot_file.hpp"
 #include "gap/diagnose.hpp"
 #include "reality/case.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::reality::answers_test {
 namespace {

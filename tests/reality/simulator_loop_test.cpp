@@ -11,14 +11,14 @@
 #include <Eigen/Core>
 
 #include "core/error.hpp"
+#include "formats/robots/robot_file.hpp"
+#include "formats/robots/simulator_file.hpp"
 #include "gap/diagnose.hpp"
 #include "gap/prepared.hpp"
 #include "gap/write_back.hpp"
 #include "reality/case.hpp"
 #include "reality/replay.hpp"
 #include "reality/signals.hpp"
-#include "robots/robot_file.hpp"
-#include "robots/simulator_file.hpp"
 #include "tests/robots/simulator_samples.hpp"
 #include "tests/support/scratch.hpp"
 

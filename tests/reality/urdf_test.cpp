@@ -8,8 +8,8 @@
 #include <mujoco/mujoco.h>
 #include <Eigen/Core>
 
-#include "robots/robot_description.hpp"
-#include "robots/robot_origin.hpp"
+#include "formats/robots/robot_description.hpp"
+#include "formats/robots/robot_origin.hpp"
 #include "tests/robots/robot_samples.hpp"
 #include "tests/support/scratch.hpp"
 

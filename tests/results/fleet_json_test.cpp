@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "robots/robot_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "tests/study/fleets.hpp"
 #include "tests/support/scratch.hpp"
 

@@ -8,8 +8,8 @@
 
 #include "core/error.hpp"
 #include "detector/multiscale/pose_sums.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "results/model_file.hpp"
-#include "robots/robot_file.hpp"
 #include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::results::kinematic_json_test {

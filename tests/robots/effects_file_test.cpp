@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "model/effect_law.hpp"
 #include "results/scenario_file.hpp"
-#include "robots/robot_file.hpp"
 
 namespace wheelwright::robots::effects_file_test {
 namespace {

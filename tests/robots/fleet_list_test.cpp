@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lists and directories of robots: roles, dates, order, and what is wrong with them.
-#include "robots/fleet_list.hpp"
+#include "formats/robots/fleet_list.hpp"
 
 #include <gtest/gtest.h>
 

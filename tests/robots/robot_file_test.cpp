@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "robots/robot_file.hpp"
+#include "formats/robots/robot_file.hpp"
 
 #include <string>
 #include <vector>

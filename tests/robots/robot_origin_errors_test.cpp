@@ -6,10 +6,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "robots/controller_file.hpp"
-#include "robots/robot_description.hpp"
-#include "robots/robot_file.hpp"
-#include "robots/robot_origin.hpp"
+#include "formats/robots/controller_file.hpp"
+#include "formats/robots/robot_description.hpp"
+#include "formats/robots/robot_file.hpp"
+#include "formats/robots/robot_origin.hpp"
 #include "tests/robots/robot_samples.hpp"
 #include "tests/support/scratch.hpp"
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Robot files from URDF and controllers: closed forms, frames that stand anyhow, and the way back through the
 // reader.
-#include "robots/robot_origin.hpp"
+#include "formats/robots/robot_origin.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include "robots/controller_file.hpp"
-#include "robots/robot_description.hpp"
-#include "robots/robot_file.hpp"
+#include "formats/robots/controller_file.hpp"
+#include "formats/robots/robot_description.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "tests/robots/robot_samples.hpp"
 #include "tests/support/scratch.hpp"
 

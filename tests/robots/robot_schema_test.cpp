@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "robots/robot_file.hpp"
+#include "formats/robots/robot_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace wheelwright::robots::robot_schema_test {

@@ -10,10 +10,10 @@
 #include <string>
 
 #include "core/error.hpp"
-#include "robots/robot_description.hpp"
-#include "robots/simulator_document.hpp"
-#include "robots/simulator_file.hpp"
-#include "robots/wheel_geometry.hpp"
+#include "formats/robots/robot_description.hpp"
+#include "formats/robots/simulator_document.hpp"
+#include "formats/robots/simulator_file.hpp"
+#include "formats/robots/wheel_geometry.hpp"
 #include "tests/robots/robot_samples.hpp"
 #include "tests/robots/simulator_samples.hpp"
 #include "tests/support/scratch.hpp"

@@ -16,11 +16,11 @@
 
 #include "commission/commission.hpp"
 #include "examples/ros2/src/node.hpp"
-#include "logs/recorded_log.hpp"
+#include "formats/logs/recorded_log.hpp"
+#include "formats/robots/online_model_file.hpp"
 #include "model/sim/simulation.hpp"
 #include "results/model_file.hpp"
 #include "results/scenario_file.hpp"
-#include "robots/online_model_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace wheelwright {

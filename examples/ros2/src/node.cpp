@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <wheelwright/core/error.hpp>
-#include <wheelwright/robots/online_model_file.hpp>
+#include <wheelwright/formats/robots/online_model_file.hpp>
 
 namespace wheelwright_diagnostics {
 

@@ -1,0 +1,697 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "formats/logs/csv.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <deque>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "core/check.hpp"
+#include "formats/files/bytes.hpp"
+#include "formats/files/words.hpp"
+#include "formats/logs/csv_format.hpp"
+#include "formats/logs/known_logger.hpp"
+#include "formats/logs/recorded_log.hpp"
+#include "formats/logs/row_log.hpp"
+
+namespace wheelwright::logs {
+namespace {
+
+constexpr std::size_t rows_looked_at = 5000;  ///< rows at the beginning of a file, for columns with rates of their own
+
+/// Content lines of one file behind its header.
+struct FileWalk {
+  FileWalk(const std::filesystem::path& path, bool hashed, bool trust)
+      : lines(files::open_bytes(path, hashed, trust), path.string()) {}
+
+  bool next(std::string_view& line) {
+    while (lines.next(line)) {
+      if (is_csv_content(line)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  files::LineReader lines;
+};
+
+CsvHeader header_of(FileWalk& walk, const CsvOptions& options, const std::string& path) {
+  std::string_view line;
+  if (!walk.next(line)) {
+    throw InputError(path + ": no header line: expected the names of the columns, then rows");
+  }
+  return read_csv_header(line, options, fmt::format("{}:{}", path, walk.lines.number()));
+}
+
+/// Names (time apart) of what `header` has, in the order of its fields.
+std::vector<std::string> names_of(const CsvHeader& header) {
+  std::vector<std::pair<std::size_t, std::string>> by_field;
+  for (const auto& [name, field] : header.found) {
+    if (name != "t") {
+      by_field.emplace_back(field, name);
+    }
+  }
+  std::sort(by_field.begin(), by_field.end());
+  std::vector<std::string> names;
+  for (auto& entry : by_field) {
+    names.push_back(std::move(entry.second));
+  }
+  return names;
+}
+
+std::vector<std::string> fields_without(const CsvHeader& header, const std::vector<std::string>& names) {
+  std::vector<std::string> ignored;
+  for (std::size_t k = 0; k < header.fields.size(); ++k) {
+    const bool used = std::any_of(header.found.begin(), header.found.end(), [&](const auto& found) {
+      return found.second == k &&
+             (found.first == "t" || std::find(names.begin(), names.end(), found.first) != names.end());
+    });
+    if (!used) {
+      ignored.push_back(header.fields[k]);
+    }
+  }
+  return ignored;
+}
+
+/// Says that other files lack columns which this one has.
+void note_left_out(const CsvHeader& header, const std::vector<std::string>& names, LogFileReport& file) {
+  std::vector<std::string> left_out = names_of(header);
+  std::erase_if(left_out, [&](const std::string& name) { return std::ranges::find(names, name) != names.end(); });
+  if (!left_out.empty()) {
+    file.notes.push_back(fmt::format("{} {} left out: a file that was given together with this one has no such column",
+                                     core::listed(left_out), left_out.size() == 1 ? "is" : "are"));
+  }
+}
+
+/// What the first rows of a file tell of all.
+struct FirstRows {
+  std::vector<CsvStream> streams;
+  std::optional<CountUnit> counts;  ///< unit of the times, where their steps tell another than their size
+  std::string time_note;            ///< why the times may be in another unit; empty where they look like s
+};
+
+/// FIELD*FACTOR as an argument, for a column that may have a factor already.
+std::string with_factor(const CsvHeader& header, const std::string& name, double factor) {
+  const auto own = header.factors.find(name);
+  return map_argument(name, header.fields[header.found.at(name)],
+                      (own == header.factors.end() ? 1.0 : own->second) * factor);
+}
+
+void describe_file(const FileWalk& lines, const CsvHeader& header, const std::vector<std::string>& names,
+                   const FirstRows& first, const CsvRowReader& rows, LogFileReport& file) {
+  file.notes.insert(file.notes.end(), header.notes.begin(), header.notes.end());
+  note_left_out(header, names, file);
+  if (!first.time_note.empty()) {
+    file.notes.push_back(first.time_note);
+  }
+  if (rows.heading().degrees()) {
+    file.notes.push_back(fmt::format("theta looks like degrees, since it jumps by nearly 360: expected rad, or {}",
+                                     with_factor(header, "theta", std::numbers::pi / 180.0)));
+  }
+  if (!rows.clock_unit().empty()) {
+    file.time_origin = rows.clock_origin();
+    file.notes.push_back(fmt::format("times are counts of {}, and were read as such", rows.clock_unit()));
+  }
+  for (const auto& [name, factor] : header.factors) {
+    file.notes.push_back(fmt::format("{} is {} times {:g}", name, header.fields[header.found.at(name)], factor));
+  }
+  const files::ByteSource& source = lines.lines.source();
+  file.format = "csv";
+  file.packing = source.packing();
+  file.bytes = source.file_bytes();
+  file.hash = source.hash();
+  file.header = header.fields;
+  file.ignored = fields_without(header, names);
+}
+
+void begin_rows(CsvRowReader& rows, const CsvHeader& header, const std::string& path, const FirstRows& first) {
+  rows.begin_file(header, path);
+  if (first.counts) {
+    rows.assume_counts(*first.counts);
+  }
+}
+
+/// A table with one clock.
+class CsvWalk final : public RowWalk {
+ public:
+  CsvWalk(const std::filesystem::path& path, const CsvOptions& options, const std::vector<std::string>& names,
+          const FirstRows& first, double longest_step, LogReport* report)
+      : names_(names), first_(first), rows_(names, report), lines_(path, report != nullptr, options.trust) {
+    rows_.set_longest_step(longest_step);
+    header_ = header_of(lines_, options, path.string());
+    begin_rows(rows_, header_, path.string(), first_);
+  }
+
+  bool next(RowOutcome& outcome) override {
+    std::string_view line;
+    if (!lines_.next(line)) {
+      return false;
+    }
+    outcome = rows_.read(line, lines_.lines.number(), lines_.lines.terminated());
+    return true;
+  }
+  [[nodiscard]] double t() const override { return rows_.t(); }
+  [[nodiscard]] const double* values() const override { return rows_.values(); }
+  void describe(LogFileReport& file) const override { describe_file(lines_, header_, names_, first_, rows_, file); }
+
+ private:
+  const std::vector<std::string>& names_;
+  FirstRows first_;
+  CsvRowReader rows_;
+  FileWalk lines_;
+  CsvHeader header_;
+};
+
+/// A table whose columns are filled in different rows: brought to the rows of the first stream.
+class MergedCsvWalk final : public RowWalk {
+ public:
+  MergedCsvWalk(const std::filesystem::path& path, const CsvOptions& options, const std::vector<std::string>& names,
+                const FirstRows& first, double longest_step, LogReport* report)
+      : names_(names),
+        first_(first),
+        rows_(names, report),
+        cleaner_(names, report),
+        lines_(path, report != nullptr, options.trust),
+        row_(names.size() + 1) {
+    header_ = header_of(lines_, options, path.string());
+    begin_rows(rows_, header_, path.string(), first_);
+    rows_.let_miss(std::vector<bool>(names.size(), true));
+    cleaner_.set_longest_step(longest_step);
+    cleaner_.begin_file(path.string() + ":");
+    std::vector<AlignedStream> aligned;
+    for (const CsvStream& stream : first_.streams) {
+      AlignedStream of;
+      of.columns = stream.columns;
+      for (const std::size_t c : stream.columns) {
+        of.angle.push_back(names[c] == "theta");
+      }
+      of.longest_gap = longest_gap_of(stream.median_step);
+      aligned.push_back(std::move(of));
+    }
+    aligner_.emplace(names.size(), std::move(aligned));
+  }
+
+  bool next(RowOutcome& outcome) override {
+    std::int64_t ns = 0;
+    while (!aligner_->pop(ns, std::span(row_).subspan(1))) {
+      std::string_view line;
+      if (finished_) {
+        return false;
+      }
+      if (!lines_.next(line)) {
+        aligner_->finish();
+        finished_ = true;
+      } else if (!take(line)) {
+        outcome = RowOutcome::dropped;
+        return true;
+      }
+    }
+    row_[0] = waiting_.front().t;
+    const std::size_t number = waiting_.front().number;
+    waiting_.pop_front();
+    for (std::size_t c = 0; c < names_.size(); ++c) {
+      if (std::isnan(row_[c + 1])) {
+        cleaner_.count(&LogReport::uncovered, number, names_[c]);
+        outcome = RowOutcome::dropped;
+        return true;
+      }
+    }
+    outcome = cleaner_.place(row_, number);
+    return true;
+  }
+
+  [[nodiscard]] double t() const override { return cleaner_.t(); }
+  [[nodiscard]] const double* values() const override { return row_.data() + 1; }
+  void describe(LogFileReport& file) const override {
+    describe_file(lines_, header_, names_, first_, rows_, file);
+    for (std::size_t s = 1; s < first_.streams.size(); ++s) {
+      for (const std::size_t c : first_.streams[s].columns) {
+        file.interpolated.push_back({names_[c],
+                                     fmt::format("the rows that have it (a share of {:.2g})", first_.streams[s].filled),
+                                     aligner_->error()[c]});
+      }
+      if (const std::size_t stale = aligner_->stale(s); stale > 0) {
+        file.notes.push_back(fmt::format("{} samples of {} are not later than the one before and were left out", stale,
+                                         names_[first_.streams[s].columns.front()]));
+      }
+    }
+  }
+
+ private:
+  struct Waiting {
+    double t = 0.0;
+    std::size_t number = 0;
+  };
+
+  /// Hands the samples of a line to the aligner; false when the line, or its part of the first stream, is dropped.
+  bool take(std::string_view line) {
+    const std::size_t number = lines_.lines.number();
+    if (!rows_.read_numbers(line, number, lines_.lines.terminated())) {
+      return false;
+    }
+    const std::span<const double> values = rows_.row();
+    if (!(std::abs(values[0]) * 1e9 < static_cast<double>(farthest_time))) {
+      throw InputError(
+          fmt::format("{}: time {} s: expected one within 146 years, where columns are filled in rows apart",
+                      cleaner_.at(number), values[0]));
+    }
+    const std::int64_t ns = std::llround(values[0] * 1e9);
+    bool whole = true;
+    for (std::size_t s = 0; s < first_.streams.size(); ++s) {
+      sample_.clear();
+      std::size_t missing = 0;
+      for (const std::size_t c : first_.streams[s].columns) {
+        sample_.push_back(values[c + 1]);
+        missing += std::isnan(values[c + 1]) ? 1 : 0;
+      }
+      if (missing == 0) {
+        aligner_->push(s, ns, sample_);
+        if (s == 0) {
+          waiting_.push_back({values[0], number});
+        }
+      } else if (s == 0 && missing < sample_.size()) {
+        cleaner_.count(&LogReport::empty, number);
+        whole = false;
+      }
+    }
+    return whole;
+  }
+
+  const std::vector<std::string>& names_;
+  FirstRows first_;
+  CsvRowReader rows_;
+  RowCleaner cleaner_;
+  FileWalk lines_;
+  CsvHeader header_;
+  std::optional<StreamAligner> aligner_;
+  std::deque<Waiting> waiting_;  ///< rows of the first stream that are in the aligner
+  std::vector<double> row_;      ///< time, then the columns
+  std::vector<double> sample_;
+  bool finished_ = false;
+};
+
+/// Finds rows that begin with an index which the header does not name (pandas with index_label=False, R's write.table)
+/// and whose last column is empty: they have as many separators as rows that merely end with one, and would be read with
+/// all columns shifted by one. They differ by this, in every row: the first field counts up by one; the field behind
+/// that of the time rises, as the time under the index does; and the time as it would be read is either that count, or
+/// does not rise. A table whose rows alone end with a separator is taken for one only where its time counts up by one
+/// and its second column never falls; the message says how such a one is written.
+class UnnamedIndex {
+ public:
+  explicit UnnamedIndex(const CsvHeader& header)
+      : separator_(header.separator), known_(header.fields.size()), time_(header.found.at("t")) {}
+
+  void add(std::string_view line, std::size_t number) {
+    if (!possible_) {
+      return;
+    }
+    const std::vector<std::string> fields = split_fields(line, separator_);
+    possible_ = fields.size() == known_ + 1 && fields.back().empty();
+    const auto count = possible_ ? files::to_number(fields[0]) : std::nullopt;
+    const auto read = possible_ ? files::to_number(fields[time_]) : std::nullopt;
+    const auto meant = possible_ ? files::to_number(fields[time_ + 1]) : std::nullopt;
+    possible_ = count && meant && *count == std::floor(*count);
+    if (possible_ && rows_ == 0) {
+      first_ = {std::string(line), number};
+    } else if (possible_) {
+      possible_ = *count == count_ + 1.0 && *meant > meant_;
+      read_rises_ = read_rises_ && read && *read > read_;
+    }
+    count_ = count.value_or(0.0);
+    meant_ = meant.value_or(0.0);
+    read_ = read.value_or(0.0);
+    ++rows_;
+  }
+
+  /// Throws InputError where the rows begin with an index.
+  void refuse(const std::string& path) const {
+    constexpr std::size_t few = 10;
+    if (possible_ && rows_ >= few && (time_ == 0 || !read_rises_)) {
+      throw InputError(
+          fmt::format("{}:{}: {} fields: expected {}, as the header has ({}); the first looks like an index of the "
+                      "rows: expected a "
+                      "name for it in the header (or, where it is none, a separator at the end of the header, too)",
+                      path, first_.second, known_ + 1, known_, files::shown(first_.first)));
+    }
+  }
+
+ private:
+  char separator_;
+  std::size_t known_, time_;
+  bool possible_ = true, read_rises_ = true;
+  std::size_t rows_ = 0;
+  std::pair<std::string, std::size_t> first_;  ///< line and its number
+  double count_ = 0.0, meant_ = 0.0, read_ = 0.0;
+};
+
+constexpr double longest_plausible = 1.0, shortest_plausible = 1e-5;  ///< s, median steps of a robot's log
+
+/// The one of `units` in which a median step of `step` of them is that of a robot's log; nullptr where none is, or two.
+const CountUnit* unit_of_step(double step, std::span<const CountUnit> units) {
+  const CountUnit* found = nullptr;
+  for (const CountUnit& unit : units) {
+    if (step * unit.seconds >= 2e-4 && step * unit.seconds <= 0.5) {
+      if (found != nullptr) {
+        return nullptr;
+      }
+      found = &unit;
+    }
+  }
+  return found;
+}
+
+bool is_implausible(double step) {
+  return step > longest_plausible * (1.0 + 1e-9) || (step > 0.0 && step < shortest_plausible);
+}
+
+/// Whether `t`, s since 1970 by a reading as ns, is a time since 2000 in ticks of 100 ns, since 1601 (Windows) or since
+/// the year 1 (.NET): as ns they are months of 1974 and 1990, in which no robot was logged to the nanosecond.
+bool is_time_of_ticks(double t) { return (t > 1.26e8 && t < 1.42e8) || (t > 6.31e8 && t < 6.47e8); }
+
+/// What is wrong with the unit of times whose median step is `step`, of which one is `t` (s, counted from where the
+/// rows' clock begins). It says which unit they look like where only one makes the step that of a robot's log.
+std::string note_on_times(const CsvHeader& header, const CsvRowReader& rows, double t, double step) {
+  if (rows.clock_unit() == "ns" && is_time_of_ticks(rows.clock_origin())) {
+    return "the times look like ticks of 100 ns, not ns since 1970: expected s, or " + with_factor(header, "t", 1e-7);
+  }
+  if (!is_implausible(step)) {
+    return {};
+  }
+  constexpr std::array<CountUnit, 1> days = {{{86400.0, "days, as a spreadsheet writes them"}}};
+  const bool serial = t > 3e4 && t < 6e4;  // days since 1900, from 1982 on
+  const CountUnit* unit = !rows.clock_unit().empty() ? nullptr
+                          : step > longest_plausible ? unit_of_step(step, count_units)
+                          : serial                   ? unit_of_step(step, days)
+                                                     : nullptr;
+  const std::string what = fmt::format("the median step is {:.4g} s: ", step);
+  return unit == nullptr
+             ? what + fmt::format("expected times in s, or --map t=\"{}*FACTOR\" where FACTOR makes s of them",
+                                  header.fields[header.found.at("t")])
+             : what + fmt::format("the times look like {}, not s: expected s, or {}", unit->name,
+                                  with_factor(header, "t", unit->seconds));
+}
+
+/// The unit of counts that were taken for `guessed` by their size: another where the median `step`, in s of the guess,
+/// is implausible and only that one makes it plausible.
+std::optional<CountUnit> unit_by_step(std::string_view guessed, double step) {
+  const auto unit = std::ranges::find(count_units, guessed, &CountUnit::name);
+  const bool doubtful = unit != count_units.end() && is_implausible(step);
+  const CountUnit* other = doubtful ? unit_of_step(step / unit->seconds, count_units) : nullptr;
+  return other == nullptr ? std::nullopt : std::optional(*other);
+}
+
+class CsvFile final : public RowFile {
+ public:
+  CsvFile(std::filesystem::path path, CsvOptions options) : path_(std::move(path)), options_(std::move(options)) {
+    FileWalk lines(path_, false, options_.trust);
+    const CsvHeader header = header_of(lines, options_, path_.string());
+    names_ = names_of(header);
+    if (names_.empty() && !options_.only) {
+      refuse_unknown_columns(header);
+    }
+  }
+
+  [[nodiscard]] std::string path() const override { return path_.string(); }
+  [[nodiscard]] const std::vector<std::string>& columns() const override { return names_; }
+  [[nodiscard]] std::unique_ptr<RowWalk> open(const std::vector<std::string>& names, double longest_step,
+                                              LogReport* report) override {
+    if (looked_for_ != names) {
+      look_at_first_rows(names);
+    }
+    if (first_.streams.size() > 1) {
+      return std::make_unique<MergedCsvWalk>(path_, options_, names, first_, longest_step, report);
+    }
+    return std::make_unique<CsvWalk>(path_, options_, names, first_, longest_step, report);
+  }
+
+ private:
+  /// Throws InputError where a file has columns beside the time and none is known: nothing would be read.
+  void refuse_unknown_columns(const CsvHeader& header) const {
+    std::vector<std::string> known = log_column_names();
+    std::erase(known, "t");
+    std::string hint;
+    bool others = false;
+    for (const std::string& field : fields_without(header, {})) {
+      others = others || !field.empty();
+      const std::string nearest = files::nearest_name(field, known);
+      if (hint.empty() && !nearest.empty()) {
+        hint = fmt::format("; did you mean {}? Then add --map {}=\"{}\"", nearest, nearest, field);
+      }
+    }
+    for (const std::string& note : header.notes) {
+      hint += "; " + note;
+    }
+    if (others) {
+      throw InputError(fmt::format(
+          "{}: no column but the time is known: the file has {}: expected one of {}, or --map "
+          "NAME=COLUMN{}{}",
+          path_.string(), core::listed(header.fields), core::listed(known), hint, known_logger(header.fields)));
+    }
+  }
+
+  /// Looks at the first rows. What is wrong with one of them is left to the walk, which says so.
+  void look_at_first_rows(const std::vector<std::string>& names) {
+    CsvRowReader rows(names, nullptr);
+    FileWalk lines(path_, false, options_.trust);
+    const CsvHeader header = header_of(lines, options_, path_.string());
+    rows.begin_file(header, path_.string());
+    rows.let_miss(std::vector<bool>(names.size(), true));
+    CsvStreamFinder finder(names);
+    UnnamedIndex index(header);
+    std::string_view line;
+    first_ = {};
+    try {
+      for (std::size_t k = 0; k < rows_looked_at && lines.next(line); ++k) {
+        if (rows.read_numbers(line, lines.lines.number(), lines.lines.terminated())) {
+          finder.add(rows.row()[0], rows.row().data() + 1);
+          index.add(line, lines.lines.number());
+        }
+      }
+      first_.streams = finder.streams();
+      judge_times(header, rows);
+    } catch (const InputError&) {
+      first_.streams.clear();
+    }
+    index.refuse(path_.string());
+    std::size_t found = 0;
+    for (const CsvStream& stream : first_.streams) {
+      found += stream.columns.size();
+    }
+    if (found < names.size()) {
+      first_.streams.clear();
+    }
+    looked_for_ = names;
+  }
+
+  /// Judges the unit of the times by the median step of the stream that gives the log its rows.
+  void judge_times(const CsvHeader& header, const CsvRowReader& rows) {
+    if (first_.streams.empty()) {
+      return;
+    }
+    const double step = static_cast<double>(first_.streams.front().median_step) * 1e-9;
+    first_.counts = unit_by_step(rows.clock_unit(), step);
+    if (!first_.counts) {
+      first_.time_note = note_on_times(header, rows, rows.row()[0], step);
+      return;
+    }
+    const double ratio =
+        first_.counts->seconds / std::ranges::find(count_units, rows.clock_unit(), &CountUnit::name)->seconds;
+    for (CsvStream& stream : first_.streams) {
+      stream.median_step = std::llround(static_cast<double>(stream.median_step) * ratio);
+    }
+  }
+
+  std::filesystem::path path_;
+  CsvOptions options_;
+  std::vector<std::string> names_;
+  std::vector<std::string> looked_for_;
+  FirstRows first_;
+};
+
+std::vector<std::unique_ptr<RowFile>> csv_files(const std::vector<std::filesystem::path>& paths,
+                                                const CsvOptions& options) {
+  check::that(!paths.empty(), "paths", "at least one file");
+  check::that(options.block_rows > 0, "block_rows", "at least 1");
+  std::vector<std::unique_ptr<RowFile>> files;
+  for (const auto& path : paths) {
+    files.push_back(csv_file(path, options));
+  }
+  return files;
+}
+
+}  // namespace
+
+std::unique_ptr<RowFile> csv_file(const std::filesystem::path& path, const CsvOptions& options) {
+  return std::make_unique<CsvFile>(path, options);
+}
+
+CsvLog::CsvLog(const std::vector<std::filesystem::path>& paths, const CsvOptions& options)
+    : RowLog(csv_files(paths, options), {options.block_rows, options.min_rows}) {}
+
+struct CsvRowParser::Impl {
+  CsvHeader header;
+  std::vector<std::string> names;
+  LogReport report;
+  std::unique_ptr<CsvRowReader> rows;
+  std::vector<double> steps;  ///< the first ones, while the median step is being learnt
+  bool learning = false;
+  std::size_t line_number = 1;
+  double start = 0.0;
+
+  static constexpr std::size_t fewest_steps = 20;
+  static constexpr std::size_t most_steps = 101;
+
+  void learn(double step) {
+    steps.push_back(step);
+    if (steps.size() >= fewest_steps) {
+      std::vector<double> sorted = steps;
+      use_median_step(middle_of(sorted));
+    }
+    learning = steps.size() < most_steps;
+  }
+
+  void use_median_step(double step) {
+    report.median_step = step;
+    rows->set_longest_step(gap_factor * step);
+  }
+};
+
+CsvRowParser::CsvRowParser(std::string_view header, const CsvOptions& options, double median_step, std::string name)
+    : impl_(std::make_unique<Impl>()) {
+  check::non_negative(median_step, "median_step");
+  if (header.starts_with("\xEF\xBB\xBF")) {
+    header.remove_prefix(3);
+  }
+  while (header.ends_with('\n') || header.ends_with('\r')) {
+    header.remove_suffix(1);
+  }
+  impl_->header = read_csv_header(header, options, name + ":1");
+  impl_->names = names_of(impl_->header);
+  impl_->rows = std::make_unique<CsvRowReader>(impl_->names, &impl_->report);
+  impl_->rows->begin_file(impl_->header, std::move(name));
+  impl_->learning = median_step == 0.0;
+  if (!impl_->learning) {
+    impl_->use_median_step(median_step);
+  }
+}
+
+CsvRowParser::~CsvRowParser() = default;
+CsvRowParser::CsvRowParser(CsvRowParser&&) noexcept = default;
+CsvRowParser& CsvRowParser::operator=(CsvRowParser&&) noexcept = default;
+
+const std::vector<std::string>& CsvRowParser::columns() const { return impl_->names; }
+const LogReport& CsvRowParser::report() const { return impl_->report; }
+
+void CsvRowParser::begin_counts() {
+  LogReport& r = impl_->report;
+  for (Occurrences* of : {&r.empty, &r.not_finite, &r.uncovered, &r.duplicates, &r.truncated, &r.resets, &r.gaps,
+                          &r.jumps, &r.wraps, &r.angle_wraps}) {
+    *of = {};
+  }
+}
+
+bool CsvRowParser::parse(std::string_view line, LogBlock& block) {
+  Impl& own = *impl_;
+  ++own.line_number;
+  while (line.ends_with('\n') || line.ends_with('\r')) {
+    line.remove_suffix(1);
+  }
+  if (!is_csv_content(line)) {
+    return false;
+  }
+  const double before = own.rows->t();
+  const RowOutcome outcome = own.rows->read(line, own.line_number, true);
+  if (outcome == RowOutcome::dropped) {
+    return false;
+  }
+  block.first_row = own.report.rows - 1;
+  block.t.assign(1, own.rows->t());
+  block.columns.resize(own.names.size());
+  for (std::size_t c = 0; c < own.names.size(); ++c) {
+    block.columns[c].assign(1, own.rows->values()[c]);
+  }
+  block.segment_starts.clear();
+  if (outcome == RowOutcome::new_segment) {
+    block.segment_starts.push_back(0);
+    ++own.report.segments;
+  } else {
+    own.report.seconds += own.rows->t() - before;
+    if (own.learning) {
+      own.learn(own.rows->t() - before);
+    }
+  }
+  return true;
+}
+
+namespace {
+
+constexpr double rarely_missing = 0.2;
+
+}  // namespace
+
+CsvStreamFinder::CsvStreamFinder(std::vector<std::string> names) : names_(std::move(names)), filled_(names_.size()) {}
+
+void CsvStreamFinder::add(double t, const double* values) {
+  t_.push_back(t);
+  for (std::size_t c = 0; c < filled_.size(); ++c) {
+    filled_[c].push_back(!std::isnan(values[c]));
+  }
+}
+
+std::vector<CsvStream> CsvStreamFinder::streams() const {
+  std::vector<CsvStream> found;
+  std::vector<std::vector<bool>> rows;  // of each stream
+  std::optional<std::size_t> dense;
+  for (std::size_t c = 0; c < filled_.size(); ++c) {
+    const auto count = static_cast<double>(std::ranges::count(filled_[c], true));
+    const double share = t_.empty() ? 1.0 : count / static_cast<double>(t_.size());
+    if (share == 0.0) {
+      continue;
+    }
+    const bool is_dense = share >= 1.0 - rarely_missing;
+    auto stream = is_dense ? dense : std::nullopt;
+    for (std::size_t s = 0; !is_dense && s < rows.size(); ++s) {
+      stream = rows[s] == filled_[c] ? std::optional(s) : stream;
+    }
+    if (!stream) {
+      stream = found.size();
+      found.emplace_back();
+      found.back().filled = share;
+      rows.push_back(filled_[c]);
+      dense = is_dense ? stream : dense;
+    }
+    found[*stream].columns.push_back(c);
+  }
+  for (std::size_t s = 0; s < found.size(); ++s) {
+    std::vector<double> steps;
+    std::optional<double> before;
+    for (std::size_t k = 0; k < t_.size(); ++k) {
+      if (rows[s][k]) {
+        if (before && t_[k] > *before) {
+          steps.push_back(t_[k] - *before);
+        }
+        before = t_[k];
+      }
+    }
+    found[s].median_step = std::llround(std::min(middle_of(steps) * 1e9, static_cast<double>(farthest_time)));
+  }
+  const auto weight = [&](const CsvStream& stream) {
+    int sum = 0;
+    for (const std::size_t c : stream.columns) {
+      sum += row_weight(names_[c]);
+    }
+    return sum;
+  };
+  std::ranges::stable_sort(found, [&](const CsvStream& a, const CsvStream& b) { return weight(a) > weight(b); });
+  return found;
+}
+
+}  // namespace wheelwright::logs

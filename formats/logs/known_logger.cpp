@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "formats/logs/known_logger.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace wheelwright::logs {
+
+std::string known_logger(const std::vector<std::string>& fields) {
+  const auto ending = [&](std::string_view name) {
+    const auto found = std::ranges::find_if(fields, [&](const std::string& field) { return field.ends_with(name); });
+    return found == fields.end() ? std::string() : *found;
+  };
+  if (const std::string speed = ending("erpm"); !speed.empty() && !ending("ms_today").empty()) {
+    return fmt::format(
+        "; this is a log of VESC Tool, of one motor: as one axis it is read with columns: {{t: {}*0.001, velocity: "
+        "{}*F, effort: {}*K}} in the robot file, where F is the number 0.10472/(pole pairs · gear ratio) and K torque "
+        "constant · gear ratio; for a robot on two wheels join the logs of both motors by time first (docs/formats.md)",
+        ending("ms_today"), speed, ending("q_axis_current"));
+  }
+  const std::string right = ending("axis0.encoder.vel_estimate"), left = ending("axis1.encoder.vel_estimate");
+  const std::string right_current = ending("axis0.motor.current_control.Iq_measured"),
+                    left_current = ending("axis1.motor.current_control.Iq_measured");
+  if (!right.empty() && !left.empty()) {
+    return fmt::format(
+        "; this is a log of an ODrive, in turns/s of the motors: where axis0 is the right wheel it is read with "
+        "columns: "
+        "{{omega_r: {}*F, omega_l: {}*F{}}} in the robot file, where F is the number 6.2832/(gear ratio); a motor that "
+        "turns backwards when the robot drives ahead has -F, and *-1 behind its current (docs/formats.md)",
+        right, left,
+        right_current.empty() || left_current.empty()
+            ? ""
+            : fmt::format(", current_r: {}, current_l: {}", right_current, left_current));
+  }
+  return {};
+}
+
+}  // namespace wheelwright::logs
