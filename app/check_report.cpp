@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "report/page.hpp"
-#include "report/sections.hpp"
 #include "results/check_words.hpp"
-#include "words/text.hpp"
+#include "results/report/page.hpp"
+#include "results/report/sections.hpp"
+#include "results/words/text.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -14,10 +14,10 @@
 #include "commission/choice/detector_choice.hpp"
 #include "core/error.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "report/choice_report.hpp"
 #include "results/detection_json.hpp"
 #include "results/model_file.hpp"
-#include "words/summary.hpp"
+#include "results/report/choice_report.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 namespace choose_command {

@@ -17,11 +17,11 @@
 #include "commission/watch/detector_walk.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "report/commission_report.hpp"
-#include "report/page.hpp"
 #include "results/detection_json.hpp"
 #include "results/model_file.hpp"
-#include "words/summary.hpp"
+#include "results/report/commission_report.hpp"
+#include "results/report/page.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

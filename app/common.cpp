@@ -25,7 +25,7 @@
 #include "formats/logs/csv.hpp"
 #include "formats/logs/recorded_log.hpp"
 #include "model/robot.hpp"
-#include "report/signals.hpp"
+#include "results/report/signals.hpp"
 
 namespace wheelwright::app {
 

@@ -27,8 +27,8 @@
 #include "formats/files/words.hpp"
 #include "formats/logs/log_file.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "report/commission_report.hpp"
-#include "report/page.hpp"
+#include "results/report/commission_report.hpp"
+#include "results/report/page.hpp"
 #include "results/software.hpp"
 
 namespace wheelwright::app {

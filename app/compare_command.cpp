@@ -11,9 +11,9 @@
 #include "commission/model_comparison.hpp"
 #include "core/words.hpp"
 #include "formats/robots/online_model_file.hpp"
-#include "report/comparison_report.hpp"
 #include "results/comparison_json.hpp"
-#include "words/comparison_words.hpp"
+#include "results/report/comparison_report.hpp"
+#include "results/words/comparison_words.hpp"
 
 namespace wheelwright::app {
 namespace compare_command {

@@ -22,11 +22,11 @@
 #include "gap/next/discrimination_design.hpp"
 #include "gap/next/further_drive.hpp"
 #include "gap/next/named_rivals.hpp"
-#include "report/design_report.hpp"
 #include "results/design_json.hpp"
 #include "results/gap_json.hpp"
 #include "results/model_file.hpp"
-#include "words/summary.hpp"
+#include "results/report/design_report.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

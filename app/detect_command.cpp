@@ -17,11 +17,11 @@
 #include "commission/watch/detector_walk.hpp"
 #include "commission/watch/incident_watch.hpp"
 #include "commission/watch/risk_watch.hpp"
-#include "report/detect_report.hpp"
-#include "report/page.hpp"
 #include "results/detection_json.hpp"
 #include "results/model_file.hpp"
-#include "words/summary.hpp"
+#include "results/report/detect_report.hpp"
+#include "results/report/page.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -11,9 +11,9 @@
 #include "app/options.hpp"
 #include "commission/doctor/log_health.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "report/health_report.hpp"
 #include "results/health_json.hpp"
-#include "words/summary.hpp"
+#include "results/report/health_report.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 namespace doctor_command {

@@ -22,12 +22,12 @@
 #include "formats/files/words.hpp"
 #include "formats/robots/fleet_list.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "report/fleet_report.hpp"
 #include "results/fleet_json.hpp"
 #include "results/fleet_logs.hpp"
+#include "results/report/fleet_report.hpp"
+#include "results/words/summary.hpp"
 #include "study/examine_robot.hpp"
 #include "study/fleet_result.hpp"
-#include "words/summary.hpp"
 
 namespace wheelwright::app {
 namespace fleet_command {

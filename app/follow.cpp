@@ -30,8 +30,8 @@
 #include "formats/files/words.hpp"
 #include "formats/logs/csv.hpp"
 #include "results/detection_json.hpp"
-#include "words/detect_words.hpp"
-#include "words/summary.hpp"
+#include "results/words/detect_words.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

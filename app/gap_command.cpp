@@ -25,11 +25,11 @@
 #include "gap/next/further_drive.hpp"
 #include "gap/prepared.hpp"
 #include "gap/write_back.hpp"
-#include "report/commission_report.hpp"
-#include "report/gap_report.hpp"
 #include "results/gap_json.hpp"
-#include "words/gap_words.hpp"
-#include "words/summary.hpp"
+#include "results/report/commission_report.hpp"
+#include "results/report/gap_report.hpp"
+#include "results/words/gap_words.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

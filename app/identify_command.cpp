@@ -14,10 +14,10 @@
 #include "core/error.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "identify/inference/identification.hpp"
-#include "report/identify_report.hpp"
 #include "results/identification_json.hpp"
-#include "words/identification_words.hpp"
-#include "words/summary.hpp"
+#include "results/report/identify_report.hpp"
+#include "results/words/identification_words.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

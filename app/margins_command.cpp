@@ -12,11 +12,11 @@
 #include "app/common.hpp"
 #include "app/options.hpp"
 #include "commission/margin_survey.hpp"
-#include "report/detect_report.hpp"
 #include "results/detection_json.hpp"
 #include "results/model_file.hpp"
-#include "words/detect_words.hpp"
-#include "words/text.hpp"
+#include "results/report/detect_report.hpp"
+#include "results/words/detect_words.hpp"
+#include "results/words/text.hpp"
 
 namespace wheelwright::app {
 using namespace words;

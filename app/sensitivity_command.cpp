@@ -12,10 +12,10 @@
 #include "app/run_items.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "report/sensitivity_report.hpp"
+#include "results/report/sensitivity_report.hpp"
 #include "results/study_json.hpp"
+#include "results/words/summary.hpp"
 #include "study/study_work.hpp"
-#include "words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

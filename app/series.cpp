@@ -15,7 +15,7 @@
 #include "core/limits.hpp"
 #include "formats/files/json.hpp"
 #include "formats/logs/log_file.hpp"
-#include "words/text.hpp"
+#include "results/words/text.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -29,7 +29,7 @@
 #include "formats/robots/robot_origin.hpp"
 #include "identify/inference/kinematic_calibration.hpp"
 #include "model/model.hpp"
-#include "words/summary.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 namespace try_command {

@@ -66,7 +66,7 @@ function(wheelwright_embed target header)
 endfunction()
 
 function(wheelwright_find_uplot js css)
-  set(dist ${PROJECT_SOURCE_DIR}/node_modules/uplot/dist)
+  set(dist ${PROJECT_SOURCE_DIR}/results/report/node_modules/uplot/dist)
   set(licence ${dist}/../LICENSE)
   foreach(file ${dist}/uPlot.iife.min.js ${dist}/uPlot.min.css ${licence})
     if(NOT EXISTS ${file})

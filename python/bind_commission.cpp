@@ -15,7 +15,7 @@
 #include "results/model_file.hpp"
 #include "results/model_json.hpp"
 #include "results/software.hpp"
-#include "words/summary.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::python {
 

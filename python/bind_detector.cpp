@@ -16,8 +16,8 @@
 #include "python/module.hpp"
 #include "results/detection_json.hpp"
 #include "results/software.hpp"
-#include "words/detect_words.hpp"
-#include "words/summary.hpp"
+#include "results/words/detect_words.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

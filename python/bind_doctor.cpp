@@ -24,8 +24,8 @@
 #include "results/health_json.hpp"
 #include "results/model_check.hpp"
 #include "results/software.hpp"
-#include "words/comparison_words.hpp"
-#include "words/summary.hpp"
+#include "results/words/comparison_words.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

@@ -17,7 +17,7 @@
 #include "python/module.hpp"
 #include "results/gap_json.hpp"
 #include "results/software.hpp"
-#include "words/gap_words.hpp"
+#include "results/words/gap_words.hpp"
 
 namespace wheelwright::python {
 

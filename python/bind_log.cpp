@@ -27,7 +27,7 @@
 #include "python/module.hpp"
 #include "results/identification_json.hpp"
 #include "results/software.hpp"
-#include "words/summary.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

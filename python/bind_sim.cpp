@@ -23,7 +23,7 @@
 #include "results/gap_json.hpp"
 #include "results/scenario_file.hpp"
 #include "results/software.hpp"
-#include "words/summary.hpp"
+#include "results/words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

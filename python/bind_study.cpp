@@ -18,8 +18,8 @@
 #include "results/fleet_logs.hpp"
 #include "results/software.hpp"
 #include "results/study_json.hpp"
+#include "results/words/summary.hpp"
 #include "study/study_work.hpp"
-#include "words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "commission/physical.hpp"
-#include "words/text.hpp"
+#include "results/words/text.hpp"
 
 namespace wheelwright::results {
 namespace {

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/robots/online_model_file.hpp"
-#include "words/comparison_words.hpp"
+#include "results/words/comparison_words.hpp"
 
 namespace wheelwright::results {
 namespace {

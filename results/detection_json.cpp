@@ -9,7 +9,7 @@
 
 #include "formats/files/json.hpp"
 #include "results/model_json.hpp"
-#include "words/detect_words.hpp"
+#include "results/words/detect_words.hpp"
 
 namespace wheelwright::results {
 

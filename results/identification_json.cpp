@@ -10,7 +10,7 @@
 #include "formats/files/words.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "results/model_json.hpp"
-#include "words/identification_words.hpp"
+#include "results/words/identification_words.hpp"
 
 namespace wheelwright::results {
 

@@ -82,7 +82,7 @@ def cmake_files(root):
     folders = [path for path in root.iterdir() if path.is_dir() and not path.name.startswith((".", "build"))
                and path.name not in ("node_modules", "out")]
     files = [path for folder in folders for pattern in ("*.cmake", "CMakeLists.txt") for path in folder.rglob(pattern)]
-    return [root / "CMakeLists.txt"] + sorted(path for path in files if not {"consumer", "ros2"} & set(path.parts))
+    return [root / "CMakeLists.txt"] + sorted(path for path in files if not {"consumer", "ros2", "node_modules"} & set(path.parts))
 
 
 def setup_packages(text):
@@ -121,7 +121,7 @@ def complaints(dependencies, in_library, in_build, setup, npm, page):
     for option in sorted(set(setup) | {setup_option(entry) for entry in dependencies}):
         listed = {name for entry in dependencies if setup_option(entry) == option for name in entry.get("packages", [])}
         compare(f"tools/setup.sh {option}".strip(), listed, setup.get(option, set()))
-    compare("package.json", {f"{entry['npm']} {entry['version']}" for entry in dependencies if "npm" in entry},
+    compare("results/report/package.json", {f"{entry['npm']} {entry['version']}" for entry in dependencies if "npm" in entry},
             {f"{name} {version}" for name, version in npm.items()})
     if page != markdown(dependencies):
         out.append(f"{PAGE} is not what is listed: tools/check_dependencies.py --write")
@@ -175,7 +175,7 @@ def gather(root):
     return (load(root), named_in_cmake(files[root / "cmake/WheelwrightDependencies.cmake"]),
             set().union(*(named_in_cmake(text) for text in files.values())),
             setup_packages((root / "tools/setup.sh").read_text(encoding="utf-8")),
-            json.loads((root / "package.json").read_text(encoding="utf-8"))["dependencies"],
+            json.loads((root / "results/report/package.json").read_text(encoding="utf-8"))["dependencies"],
             page.read_text(encoding="utf-8") if page.exists() else "")
 
 

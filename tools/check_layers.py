@@ -40,10 +40,10 @@ LAYERS = [
         "study": "study",
     }),
     ("answers", {
-        "words": "words",
+        "words": "results/words",
         "results": "results",
         "export": "detector/export",
-        "report": "report",
+        "report": "results/report",
     }),
     ("programs", {
         "app": "app",

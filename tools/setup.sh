@@ -69,6 +69,7 @@ install $packages
 
 # uPlot draws the time series of the report. npm checks it against package-lock.json; where there is no npm, which would bring
 # three hundred packages, its registry's archive is fetched and checked the same way.
+cd results/report
 if ! cmp -s package-lock.json node_modules/.wheelwright-lock; then
   echo "setup: fetching uPlot from npm's registry"
   if command -v npm >/dev/null; then

@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "identify/inference/identification.hpp"
+#include "results/words/identification_words.hpp"
 #include "tests/support/drives.hpp"
-#include "words/identification_words.hpp"
 
 namespace wheelwright::inference::identification_test {
 

@@ -11,10 +11,10 @@
 
 #include <gtest/gtest.h>
 
-#include "report/commission_report.hpp"
-#include "report/detect_report.hpp"
-#include "report/gap_report.hpp"
-#include "report/health_report.hpp"
+#include "results/report/commission_report.hpp"
+#include "results/report/detect_report.hpp"
+#include "results/report/gap_report.hpp"
+#include "results/report/health_report.hpp"
 #include "tests/report/example.hpp"
 #include "tests/report/gap_example.hpp"
 #include "tests/support/skip.hpp"

@@ -12,7 +12,7 @@
 
 #include "commission/commission.hpp"
 #include "model/differential_drive.hpp"
-#include "report/page.hpp"
+#include "results/report/page.hpp"
 
 namespace wheelwright::report::report_example {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page of a fleet: small, escaped, and there for any fleet.
-#include "report/fleet_report.hpp"
+#include "results/report/fleet_report.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include "report/gap_report.hpp"
+#include "results/report/gap_report.hpp"
+#include "results/words/gap_words.hpp"
 #include "tests/report/example.hpp"
 #include "tests/report/gap_example.hpp"
-#include "words/gap_words.hpp"
 
 namespace wheelwright::report::gap_report_test {
 using namespace words;

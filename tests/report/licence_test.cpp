@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "report/page.hpp"
+#include "results/report/page.hpp"
 
 namespace wheelwright::report {
 namespace {

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The first screen of a detector's page: size over time to detection, a line for each guarantee, and what each is
 // worth.
-#include "report/outlook.hpp"
+#include "results/report/outlook.hpp"
 
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "report/commission_report.hpp"
+#include "results/report/commission_report.hpp"
+#include "results/words/commission_words.hpp"
+#include "results/words/text.hpp"
 #include "tests/support/drives.hpp"
-#include "words/commission_words.hpp"
-#include "words/text.hpp"
 
 namespace wheelwright::report::outlook_test {
 namespace {

@@ -11,17 +11,17 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "report/commission_report.hpp"
-#include "report/design_report.hpp"
-#include "report/detect_report.hpp"
-#include "report/gap_report.hpp"
-#include "report/identify_report.hpp"
-#include "report/page.hpp"
-#include "report/signals.hpp"
+#include "results/report/commission_report.hpp"
+#include "results/report/design_report.hpp"
+#include "results/report/detect_report.hpp"
+#include "results/report/gap_report.hpp"
+#include "results/report/identify_report.hpp"
+#include "results/report/page.hpp"
+#include "results/report/signals.hpp"
+#include "results/words/identification_words.hpp"
 #include "tests/report/example.hpp"
 #include "tests/report/gap_example.hpp"
 #include "tests/support/drives.hpp"
-#include "words/identification_words.hpp"
 
 namespace wheelwright::report::page_test {
 using namespace words;

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "report/signals.hpp"
+#include "results/report/signals.hpp"
 
 namespace wheelwright::report::raw_signals_test {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "core/error.hpp"
 #include "core/limits.hpp"
-#include "report/sensitivity_report.hpp"
+#include "results/report/sensitivity_report.hpp"
 
 namespace wheelwright::report::sensitivity_drawings_test {
 

@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "report/commission_report.hpp"
-#include "report/drawing.hpp"
+#include "results/report/commission_report.hpp"
+#include "results/report/drawing.hpp"
 #include "tests/report/example.hpp"
 
 namespace wheelwright::report::set_drawings_test {

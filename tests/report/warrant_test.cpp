@@ -7,9 +7,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "report/commission_report.hpp"
-#include "report/detect_report.hpp"
-#include "report/sections.hpp"
+#include "results/report/commission_report.hpp"
+#include "results/report/detect_report.hpp"
+#include "results/report/sections.hpp"
 #include "tests/report/example.hpp"
 
 namespace wheelwright::report::warrant_test {

@@ -6,10 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "commission/commission.hpp"
+#include "results/words/commission_words.hpp"
+#include "results/words/summary.hpp"
 #include "tests/support/exact_axis.hpp"
 #include "tests/support/kinematic_drives.hpp"
-#include "words/commission_words.hpp"
-#include "words/summary.hpp"
 
 namespace wheelwright::words::at_risk_words_test {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "words/detect_words.hpp"
+#include "results/words/detect_words.hpp"
 
 namespace wheelwright::words::margin_words_test {
 namespace {

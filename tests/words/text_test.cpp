@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "words/text.hpp"
+#include "results/words/text.hpp"
 
 #include <cmath>
 #include <limits>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "report/page.hpp"
+#include "results/report/page.hpp"
 
 namespace wheelwright::words {
 namespace {

@@ -2,8 +2,8 @@
 /// \file
 /// Each outcome has its sentences.
 #include "model/fault_type.hpp"
-#include "words/commission_words.hpp"
-#include "words/detect_words.hpp"
+#include "results/words/commission_words.hpp"
+#include "results/words/detect_words.hpp"
 
 #include <cmath>
 #include <limits>
@@ -11,8 +11,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "report/commission_report.hpp"
-#include "report/detect_report.hpp"
+#include "results/report/commission_report.hpp"
+#include "results/report/detect_report.hpp"
 #include "tests/report/example.hpp"
 
 namespace wheelwright::words {
