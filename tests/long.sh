@@ -6,8 +6,8 @@
 #   tests/long.sh campaign    the campaign on random robots, five minutes of it
 #   tests/long.sh fuzz [SECONDS]  every fuzzer for a minute, or so long (docs/fuzzing.md)
 #   tests/long.sh mutations [COUNT]  every reader on 100,000 mutations, or so many: slowest input and memory
-#   tests/long.sh endurance   a day at 1 kHz, with trouble every hour (tools/endurance.py, ten minutes)
-#   tests/long.sh faults      kills, full disks, closed streams and the like, 2,000 of them (tools/faults.py, as root)
+#   tests/long.sh endurance   a day at 1 kHz, with trouble every hour (tests/campaigns/endurance.py, ten minutes)
+#   tests/long.sh faults      kills, full disks, closed streams and the like, 2,000 of them (tests/campaigns/faults.py, as root)
 #   tests/long.sh coverage    lines that the tests run, by room, and those they do not (tools/coverage.py)
 #   tests/long.sh alone       every source file by itself, by clang (tools/check_alone.py, ten minutes)
 #   tests/long.sh tidy        clang-tidy (tools/check_tidy.py, half an hour)
@@ -32,11 +32,11 @@ for part in ${*:-slow campaign sanitizers}; do
       ;;
     endurance)
       tools/build.sh release wheelwright wheelwright-endurance
-      tools/endurance.py build
+      tests/campaigns/endurance.py build
       ;;
     faults)
       tools/build.sh release wheelwright
-      tools/faults.py --program build/bin/wheelwright
+      tests/campaigns/faults.py --program build/bin/wheelwright
       ;;
     coverage)
       tools/build.sh coverage
@@ -63,7 +63,7 @@ for part in ${*:-slow campaign sanitizers}; do
     fuzz)
       case ${2:-} in [0-9]*) fuzz_seconds=$2 ;; esac
       tools/setup.sh --fuzz
-      fuzz/run.sh "$fuzz_seconds"
+      tests/fuzzers/run.sh "$fuzz_seconds"
       ;;
     mutations)
       case ${2:-} in [0-9]*) mutations=$2 ;; esac

@@ -26,7 +26,7 @@ USES = {
     "python": "The Python package",
     "tests": "Tests alone",
     "bench": "Benchmarks alone",
-    "reality": "The independent world (`reality/`) alone",
+    "reality": "The independent world (`tests/world/`) alone",
     "build": "Building",
     "documentation": "This documentation",
     "packaging": "Packages",

@@ -3,7 +3,7 @@
 """clang-tidy over what build/ compiles, a dozen files at once.
 
     check_tidy.py [FOLDER...]    folders of this repository (bounds, logs, ...); without one all but
-                                  tests, fuzz, bench and examples
+                                  tests and examples
 
 Checks, and why some are left out, stand in .clang-tidy. build/ has to be built: its unity sources are read, since most of
 the time goes into the headers of libraries, and these are then read once for twelve files. Exit code 1 where something is found,
@@ -24,7 +24,7 @@ from check_alone import clang_options
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
-LEFT_OUT = ("tests", "fuzz", "bench", "examples")
+LEFT_OUT = ("tests", "examples")
 # Of unity sources, and of options that GCC alone knows.
 CHECKS = "--checks=-bugprone-suspicious-include,-clang-diagnostic-unknown-warning-option"
 FINDING = re.compile(r"^(/[^:\n]+):(\d+):(\d+): (?:warning|error): .*\[[^\]]+\]$")

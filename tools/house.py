@@ -49,7 +49,7 @@ def installed(root, files):
         for header in re.findall(r'#include (?:<wheelwright/|")([\w/]+\.hpp)[>"]', text):
             users[header].add(name)
     reached = {header for header in public
-               if any(room_of(user) not in (room_of(header), "tests", "bench", "tools") for user in users[header])}
+               if any(room_of(user) not in (room_of(header), "tests", "tools") for user in users[header])}
     grown = True
     while grown:  # what such a header includes is needed too
         below = {header for header in public - reached if any(user in reached for user in users[header])}
@@ -113,7 +113,7 @@ def table(root, files):
         ("product lines (with python, reality)", sum(text.count("\n") for text in product.values()), 80000),
         ("files", len(product), 480),
         ("sources", sum(name.endswith(".cpp") for name in product), 230),
-        ("lines of tests and bench", lines_of(files, {"tests", "bench"}), 33000),
+        ("lines of tests, benchmarks and fuzzers", lines_of(files, {"tests"}), 33000),
         ("installed headers", len(public), 120),
         ("of them used by no other room", len(unused), 0),
         ("comparisons with names of effects, outside readers", len(comparisons(files, effects)), 0),

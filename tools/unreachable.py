@@ -263,7 +263,8 @@ def main():
         objects = [path for room in PRODUCT for path in sorted((arguments.build / room).rglob("*.o"))]
         unreached, everywhere = find_unreached(everything(arguments.build, objects), linked(arguments.build))
         found = sorted({*unreached_functions(unreached, texts, kept), *never_compiled(texts, everywhere), *found})
-        watchers = [path for folder in ("tests", "bench") for path in sorted((ROOT / folder).rglob("*.[ch]pp"))]
+        watchers = [path for path in sorted((ROOT / "tests").rglob("*.[ch]pp"))
+                    if check_layers.module_of(path.relative_to(ROOT).as_posix()) == "tests"]
         looked_at = set(re.findall(r"[.>](\w+)\(\)", "\n".join(path.read_text(encoding="utf-8") for path in watchers)))
         found = [each for each in found if not (each[3] in looked_at and is_accessor(texts, each))]
     print(table(found))

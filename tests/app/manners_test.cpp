@@ -287,7 +287,7 @@ TEST_F(Manners, NamesMakeNoLinesOfTheirOwn) {
 TEST_F(Manners, WithheldCasesHaveNamesOfOurs) {
   std::filesystem::create_directory(path("set"));
   put("set/answers.json", R"json({"$(touch pwned)": {"effects": []}})json");
-  const std::string script = std::string(WHEELWRIGHT_SOURCE_DIR) + "/tools/withheld.sh";
+  const std::string script = std::string(WHEELWRIGHT_SOURCE_DIR) + "/tests/campaigns/withheld.sh";
   const int status =
       std::system(fmt::format("cd '{}' && sh '{}' --out out set > said 2>&1", directory_.string(), script).c_str());
   EXPECT_NE(status, 0);

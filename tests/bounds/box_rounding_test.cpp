@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each step that rounds the support of a box outward, against rationals with zero tolerance. tools/mutate_rounding.sh
+// Each step that rounds the support of a box outward, against rationals with zero tolerance. tests/campaigns/mutate_rounding.sh
 // takes the steps away one by one, and these tests have to notice.
 #include <cmath>
 #include <vector>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each step that rounds a bound outward, against rationals with zero tolerance and where nothing else hides it: sets
 // far from the origin and directions across it, so that products cancel; optima that are no doubles; multipliers that
-// cancel. tools/mutate_rounding.sh takes the steps away one by one, and these tests have to notice.
+// cancel. tests/campaigns/mutate_rounding.sh takes the steps away one by one, and these tests have to notice.
 #include <cmath>
 #include <functional>
 #include <memory>

@@ -14,7 +14,7 @@ if [ "$#" -eq 3 ]; then
   rm -rf "$3"
   mkdir -p "$3"
   cd "$3"
-  exec "$here/../../tools/slurm_node.sh" slurm "$here/array.sh" inside "$program" "$make_fleet" "$here/../../tools/slurm"
+  exec "$here/../../tests/campaigns/slurm_node.sh" slurm "$here/array.sh" inside "$program" "$make_fleet" "$here/../../tools/slurm"
 fi
 
 # From here on beside a Slurm, in SCRATCH.

@@ -1,6 +1,0 @@
-// SPDX-License-Identifier: Apache-2.0
-#include "fuzz/log.hpp"
-
-int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  return wheelwright::fuzz::read_log(data, size, ".db3");
-}
