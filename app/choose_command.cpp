@@ -135,7 +135,7 @@ Run add_choose(CLI::App& program) {
       .add_option(
           "--guarantee", a->choice.either,
           "Which certain sizes candidates are compared by: those for every-noise within its bounds, or either, by "
-          "whichever guarantee sees a fault first (docs/risk.md); both are told")
+          "whichever guarantee sees a fault first (docs/methods/risk.md); both are told")
       ->transform(CLI::CheckedTransformer(std::map<std::string, bool>{{"every-noise", false}, {"either", true}})
                       .description("{every-noise,either}"))
       ->default_str("every-noise")

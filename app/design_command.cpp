@@ -240,7 +240,7 @@ int run(const Arguments& a) {
   if (a.guarantee == design::Promise::at_risk && !subject.averaging) {
     throw InputError(
         "--guarantee at-risk: no errors are known to average out: expected noise: {effort: {bound: …, bias: …}} in the "
-        "robot file, or a model that says something at a stated risk (docs/risk.md)");
+        "robot file, or a model that says something at a stated risk (docs/methods/risk.md)");
   }
   design::MotionLimits limits = limits_from(a, subject.robot);
   if (a.aim == "discrimination") {
@@ -340,7 +340,7 @@ Run add_design(CLI::App& program) {
   command
       .add_option("--guarantee", a->guarantee,
                   "The promise that is to be good: for every-noise within its bounds, or at-risk, where errors average "
-                  "out (docs/risk.md); both are told")
+                  "out (docs/methods/risk.md); both are told")
       ->transform(
           CLI::CheckedTransformer(std::map<std::string, design::Promise>{{"every-noise", design::Promise::every_noise},
                                                                          {"at-risk", design::Promise::at_risk}})

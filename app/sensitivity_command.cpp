@@ -46,7 +46,8 @@ constexpr const char* kExamples =
     "  wheelwright sensitivity study.yaml --out result --threads 8\n"
     "  mpirun wheelwright sensitivity study.yaml --out result\n"
     "  wheelwright sensitivity study.yaml --out result --shard 3/40     # of a job array; then --merge\n\n"
-    "Results are kept as they come: a run that was killed goes on where it was. docs/sensitivity.md lists all inputs "
+    "Results are kept as they come: a run that was killed goes on where it was. docs/methods/sensitivity.md lists all "
+    "inputs "
     "and "
     "quantities.";
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The assumptions of a commissioned model, and the verdict of its log on each (docs/assumptions.md).
+/// The assumptions of a commissioned model, and the verdict of its log on each (docs/methods/assumptions.md).
 #pragma once
 
 #include <vector>

@@ -110,7 +110,7 @@ void add_at_risk(MarginSurvey& survey, LogSource& log, const OnlineModel& model,
                  const std::vector<detector::OnsetMargin>& worst_case, const MarginSurveyOptions& options) {
   const bool of_pose = watches_pose(log, model);
   if (!model.at_risk && !of_pose) {
-    survey.without_risk = "the model says nothing at a stated risk (docs/risk.md)";
+    survey.without_risk = "the model says nothing at a stated risk (docs/methods/risk.md)";
     return;
   }
   if (options.risk_onsets == 0) {

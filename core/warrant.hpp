@@ -11,7 +11,7 @@ namespace wheelwright::core {
 /// Kind of promise of a bound, a threshold or a margin. Results name it per number, and these words are used in no
 /// other sense.
 enum class Warrant {
-  guaranteed,    ///< declared bounds of the sensors, and assumptions of which no test failed (docs/assumptions.md)
+  guaranteed,  ///< declared bounds of the sensors, and assumptions of which no test failed (docs/methods/assumptions.md)
   extrapolated,  ///< noise bounds learnt from a log, or an assumption that the log contradicts
   statistical,   ///< declared noise that is also independent from sample to sample, at a stated confidence
 };
@@ -69,7 +69,7 @@ enum class AssumptionVerdict {
 
 /// Something that is taken as given.
 struct Assumption {
-  std::string id{};           ///< as in docs/assumptions.md, e.g. "effort_hold"
+  std::string id{};           ///< as in docs/methods/assumptions.md, e.g. "effort_hold"
   std::string statement{};    ///< what is taken as given of this robot, one sentence
   std::string declared_by{};  ///< key of the robot file; empty where there is none
   std::string test{};         ///< how the log is tested for it; empty where it is not

@@ -318,7 +318,8 @@ void bind_doctor(py::module_& m) {
         "`wheelwright choose` does.\n\n"
         "faults: name -> size (None: 0.2 of a share), or names; none: wheel_radius and wheel_radius_right. window: s "
         "after the onset. false_alarms: probability of one in an hour that is allowed; 0: never within the declared "
-        "noise. guarantee: every_noise, or either, by whichever sees a fault first (docs/risk.md). The result does not "
+        "noise. guarantee: every_noise, or either, by whichever sees a fault first (docs/methods/risk.md). The result "
+        "does not "
         "depend on `threads`. The interpreter's lock is released; Ctrl-C ends the work.");
   bind_check(m);
   bind_compare(m);

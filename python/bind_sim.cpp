@@ -299,7 +299,8 @@ void bind_sim(py::module_& m) {
         "(rad/s), acceleration (rad/s^2), effort (N m): of a wheel; those of the robot file where they are not given. "
         "radius: m about the start; box: (xmin, xmax, ymin, ymax), m. rate: of the log to come, Hz, for a Robot. "
         "criterion: geometric_mean, mean or largest. guarantee: every_noise, or at_risk where errors average out "
-        "(docs/risk.md), is the promise that is to be good; both are told. faults: name -> size asked for. The result "
+        "(docs/methods/risk.md), is the promise that is to be good; both are told. faults: name -> size asked for. The "
+        "result "
         "does not depend on `threads`. The interpreter's lock is released; Ctrl-C ends the work.");
 }
 

@@ -228,7 +228,8 @@ void tell_kinematic_premises(const KinematicClaims& claims, std::vector<std::str
   if (claims.at_risk) {
     premises.push_back(fmt::format(
         "of the pose at a risk of {:g}: that its errors are as the robot file says and of no larger mean; the "
-        "inequality for their sums (docs/risk.md); that scales, the delay, and the part of the log on which V0 is "
+        "inequality for their sums (docs/methods/risk.md); that scales, the delay, and the part of the log on which V0 "
+        "is "
         "learnt were chosen without this log; and how the sums are made, which commissioning and this check have in "
         "common",
         claims.model.at_risk->risk));
@@ -259,7 +260,8 @@ void tell_premises(const ModelClaims& claims, ModelCheck& result) {
     const bool estimated = claims.at_risk->model.warrant == core::Warrant::extrapolated;
     result.premises.push_back(fmt::format(
         "at a risk of {:g}: that errors are as {} and of no larger mean, independent from joint to "
-        "joint; the inequality for their sums (docs/risk.md); that delays, shares of the risk, and the part of the log "
+        "joint; the inequality for their sums (docs/methods/risk.md); that delays, shares of the risk, and the part of "
+        "the log "
         "on which a scale is learnt, were chosen without this log; and how elements and sample weights are computed, "
         "which commissioning and this check have in common",
         claims.at_risk->model.risk,

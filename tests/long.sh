@@ -4,7 +4,7 @@
 # What takes longer than a change should wait for; each part can be asked for alone:
 #   tests/long.sh slow        properties over hundreds of runs
 #   tests/long.sh campaign    the campaign on random robots, five minutes of it
-#   tests/long.sh fuzz [SECONDS]  every fuzzer for a minute, or so long (docs/fuzzing.md)
+#   tests/long.sh fuzz [SECONDS]  every fuzzer for a minute, or so long (docs/inside/fuzzing.md)
 #   tests/long.sh mutations [COUNT]  every reader on 100,000 mutations, or so many: slowest input and memory
 #   tests/long.sh endurance   a day at 1 kHz, with trouble every hour (tests/campaigns/endurance.py, ten minutes)
 #   tests/long.sh faults      kills, full disks, closed streams and the like, 2,000 of them (tests/campaigns/faults.py, as root)

@@ -3,8 +3,8 @@
 """One list of dependencies, cmake/dependencies.json, and everything that has to agree with it.
 
     check_dependencies.py               exit code 1 where the build's files, tools/setup.sh, package.json or
-                                        docs/dependencies.md say something else
-    check_dependencies.py --write       writes docs/dependencies.md
+                                        docs/inside/dependencies.md say something else
+    check_dependencies.py --write       writes docs/inside/dependencies.md
     check_dependencies.py --sbom FILE   writes a bill of materials of what is distributed (CycloneDX 1.4, JSON), with the
                                         versions that dpkg has where it has them
     check_dependencies.py --self-test   the check notices what it is for
@@ -18,7 +18,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = "docs/dependencies.md"
+PAGE = "docs/inside/dependencies.md"
 USES = {
     "library": "The library and the program",
     "program": "The program alone",

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the pages tell a reader to type works.
 
-    check_examples.py PROGRAM     runs the console blocks of docs/tutorial.md and compares what they print, three dots for
-                                  what is left out; types the commands of docs/own_log.md and docs/embedding.md, from a
+    check_examples.py PROGRAM     runs the console blocks of docs/use/tutorial.md and compares what they print, three dots for
+                                  what is left out; types the commands of docs/use/own_log.md and docs/use/embedding.md, from a
                                   recording that is written here, byte by byte, and compiles the latter's C++; looks up each option behind `wheelwright
                                   COMMAND` in README.md and docs/ in that command's help. Exit code 1 where something
                                   differs
@@ -269,10 +269,10 @@ def main():
             helps[command] = done.stdout if done.returncode == 0 else None
         return helps[command]
 
-    pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-    found = list(wrong_options(pages, help_of)) + list(run(program, ROOT / "docs/tutorial.md"))
-    found += compile_page(ROOT / "docs/embedding.md", str(Path(program).resolve().parent.parent / "include"))
-    found += type_pages(program, [ROOT / "docs/own_log.md", ROOT / "docs/embedding.md"])
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    found = list(wrong_options(pages, help_of)) + list(run(program, ROOT / "docs/use/tutorial.md"))
+    found += compile_page(ROOT / "docs/use/embedding.md", str(Path(program).resolve().parent.parent / "include"))
+    found += type_pages(program, [ROOT / "docs/use/own_log.md", ROOT / "docs/use/embedding.md"])
     for complaint in found:
         print("examples: " + complaint)
     if not found:

@@ -73,7 +73,7 @@ def wrong_in(page, root):
 
 def pages(root):
     # docs/site is the frame of the site, whose links tools/docs.sh checks.
-    return sorted(root.glob("*.md")) + sorted((root / "docs").glob("*.md"))
+    return sorted(root.glob("*.md")) + sorted(path for path in (root / "docs").rglob("*.md") if path.parent.name != "site")
 
 
 def self_test():

@@ -28,7 +28,7 @@ import check_layers  # noqa: E402
 
 PRODUCT = list(check_layers.MODULES)
 # What these name stays: they show or measure what embedders may use.
-KEPT = ["examples/*.cpp", "tests/consumer/*.cpp", "tools/*.cpp", "docs/embedding.md", "docs/own_effect.md"]
+KEPT = ["examples/*.cpp", "tests/consumer/*.cpp", "tools/*.cpp", "docs/use/embedding.md", "docs/use/own_effect.md"]
 SECTIONS = "-O0 -g1 -w -ffunction-sections -fdata-sections"
 OPTIONS = ["-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=", f"-DCMAKE_CXX_FLAGS={SECTIONS}",
            "-DCMAKE_EXE_LINKER_FLAGS=-Wl,--gc-sections", "-DCMAKE_MODULE_LINKER_FLAGS=-Wl,--gc-sections,--exclude-libs,ALL",

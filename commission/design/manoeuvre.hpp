@@ -39,7 +39,7 @@ struct FigureEight {
 /// In which sense a plan's promises hold.
 enum class Promise {
   every_noise,  ///< whatever the noise does within its bounds
-  at_risk,      ///< but for a stated chance, where errors average out (docs/risk.md)
+  at_risk,      ///< but for a stated chance, where errors average out (docs/methods/risk.md)
 };
 
 /// Options of design_manoeuvre().

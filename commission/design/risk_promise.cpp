@@ -66,7 +66,7 @@ JudgedFault promise_of(const std::vector<Showing>& best, const std::vector<doubl
 Judgement judge_by_sums(const Plan& plan, const DesignSubject& subject, const OnlineModel& model,
                         const std::vector<InspectedFault>& inspected) {
   check_inspected(inspected);
-  check::that(model.at_risk.has_value(), "model", "one that says something at a stated risk (docs/risk.md)");
+  check::that(model.at_risk.has_value(), "model", "one that says something at a stated risk (docs/methods/risk.md)");
   const LogTable log = planned_log(plan, subject);
   TableSource source(log);
   const RegressorFilter filter = planned_filter(source, plan, subject);
@@ -163,7 +163,7 @@ RiskPromises promised_faults_at_risk(const Plan& plan, const DesignSubject& subj
 PlanObjective certain_detection_at_risk(const DesignSubject& subject, const OnlineModel& model,
                                         const std::vector<InspectedFault>& faults) {
   check::that(model.at_risk.has_value(), "promises at a stated risk: model",
-              "one that says something at a risk (docs/risk.md)");
+              "one that says something at a risk (docs/methods/risk.md)");
   return [&subject, &model, faults](const Plan& plan) {
     return worst_ratio(judge_by_sums(plan, subject, model, faults).faults);
   };

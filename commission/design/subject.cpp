@@ -270,8 +270,9 @@ RegressorFilter planned_filter(LogSource& log, const Plan& plan, const DesignSub
 }
 
 filter::ErrorClasses planned_classes(const Plan& plan, const DesignSubject& subject) {
-  check::that(subject.averaging.has_value(), "promises at a stated risk: noise",
-              "effort: {bound: …, bias: …} in the robot file, or a model that says something at a risk (docs/risk.md)");
+  check::that(
+      subject.averaging.has_value(), "promises at a stated risk: noise",
+      "effort: {bound: …, bias: …} in the robot file, or a model that says something at a risk (docs/methods/risk.md)");
   filter::ErrorClasses classes = *subject.averaging;
   const double nominal = subject.measurement.nominal_step;
   classes.shortest_step = nominal > 0.0 ? classes.shortest_step * (plan.step / nominal) : plan.step;

@@ -36,7 +36,7 @@ enum class FindingTopic { time, signals, motion, units };
 
 /// One finding.
 struct LogFinding {
-  std::string id{};  ///< e.g. "time.jitter", "signals.saturation": docs/doctor.md lists them
+  std::string id{};  ///< e.g. "time.jitter", "signals.saturation": docs/use/doctor.md lists them
   FindingTopic topic = FindingTopic::time;
   FindingSeverity severity = FindingSeverity::fine;
   std::string sentence{};                                   ///< what was found, with its numbers
@@ -95,7 +95,7 @@ struct LogHealth {
 /// a differential drive or a single axis, by the columns) tells columns, geometry, limits and the model whose
 /// excitation is judged; without it, scales of units cannot be judged against radius, track and mass.
 ///
-/// The checks and their thresholds are in docs/doctor.md. Excitation is that of the filtered regressor (25) as
+/// The checks and their thresholds are in docs/use/doctor.md. Excitation is that of the filtered regressor (25) as
 /// commission_robot() makes it: settle(), fit_log() and identifiability(); the delay between effort and motion is that
 /// of TimeShiftedRows with its standard error. Throws nothing for what a log may hold; InvalidArgument for a robot that
 /// makes no sense, a log whose columns differ in length, or segments that do not ascend over its rows. The result does

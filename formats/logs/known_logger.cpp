@@ -17,7 +17,8 @@ std::string known_logger(const std::vector<std::string>& fields) {
     return fmt::format(
         "; this is a log of VESC Tool, of one motor: as one axis it is read with columns: {{t: {}*0.001, velocity: "
         "{}*F, effort: {}*K}} in the robot file, where F is the number 0.10472/(pole pairs · gear ratio) and K torque "
-        "constant · gear ratio; for a robot on two wheels join the logs of both motors by time first (docs/formats.md)",
+        "constant · gear ratio; for a robot on two wheels join the logs of both motors by time first "
+        "(docs/use/formats.md)",
         ending("ms_today"), speed, ending("q_axis_current"));
   }
   const std::string right = ending("axis0.encoder.vel_estimate"), left = ending("axis1.encoder.vel_estimate");
@@ -28,7 +29,7 @@ std::string known_logger(const std::vector<std::string>& fields) {
         "; this is a log of an ODrive, in turns/s of the motors: where axis0 is the right wheel it is read with "
         "columns: "
         "{{omega_r: {}*F, omega_l: {}*F{}}} in the robot file, where F is the number 6.2832/(gear ratio); a motor that "
-        "turns backwards when the robot drives ahead has -F, and *-1 behind its current (docs/formats.md)",
+        "turns backwards when the robot drives ahead has -F, and *-1 behind its current (docs/use/formats.md)",
         right, left,
         right_current.empty() || left_current.empty()
             ? ""

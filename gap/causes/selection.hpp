@@ -12,7 +12,7 @@
 /// the noise floor no further cause is sought. Columns are not exact (a smoothed sign, a neglected second order), so
 /// the misfit of the best set is the reference by which other sets count as equally good.
 ///
-/// Naive selection rule for comparison with selection.hpp (docs/gap.md has its results).
+/// Naive selection rule for comparison with selection.hpp (docs/methods/gap.md has its results).
 #pragma once
 
 #include <cstddef>

@@ -26,7 +26,7 @@ struct FilteredRow {
   Eigen::VectorXd dy;  ///< n, n̄ >= 0
 };
 
-/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of docs/notation.md for Y_f, with
+/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of docs/methods/notation.md for Y_f, with
 /// kernels that need no motion between samples for the acceleration, whatever the steps.
 ///
 /// A row is the equation (20) multiplied by a weight w and integrated. For **angles** w goes linearly from one sample

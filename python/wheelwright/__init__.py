@@ -8,7 +8,7 @@
     run = ww.Detector(result.model).run(ww.read_log("another.csv", robot))
     run.residual, run.lower, run.upper, run.events
 
-SI units everywhere; numbers of equations are those of Dixon, Walker and Dawson (2001). See docs/python.md.
+SI units everywhere; numbers of equations are those of Dixon, Walker and Dawson (2001). See docs/use/python.md.
 """
 
 from . import bounds, plot

@@ -73,7 +73,7 @@ TEST_F(SlowDesign, DesignSimulateCommissionInARow) {
 }
 
 TEST_F(Design, NamesAllThatIsMissingAtOnce) {
-  // The robot file of docs/own_log.md.
+  // The robot file of docs/use/own_log.md.
   const std::string own =
       "name: my_robot\nmodel: differential_drive\nwheel_radius: 0.0975\ntrack_width: 0.381\n"
       "effort: {kind: torque}\n";

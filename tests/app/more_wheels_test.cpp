@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot that skids in turns (docs/more_wheels.md): in its kinematics it is one whose track is wider than the tape
+// A robot that skids in turns (docs/use/more_wheels.md): in its kinematics it is one whose track is wider than the tape
 // measure says, here 1.4 times, and whose wheels are 3 % smaller.
 #include "core/words.hpp"
 

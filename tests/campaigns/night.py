@@ -7,8 +7,8 @@
 Every shard is a job of one core: it starts, reads the list, examines its robots one after the other, stores each
 result, and ends. Cores have speeds of their own, some are slow; jobs die and begin again where they stopped; logs come
 from one file system that all cores share. The scheduler gives a core that is free the next shard. When the last one is
-done one process merges. Parameters are what was measured on the machine of docs/scale.md, or guesses that are named as
-such there. Everything is drawn from --seed. --table prints the table of docs/scale.md.
+done one process merges. Parameters are what was measured on the machine of docs/use/scale.md, or guesses that are named as
+such there. Everything is drawn from --seed. --table prints the table of docs/use/scale.md.
 """
 
 import argparse

@@ -106,10 +106,10 @@ TEST(Assumptions, AreTheSameInResultAndModelEachNamedOnce) {
   }
 }
 
-// docs/assumptions.md has a row for each that code can list, and the key that declares it.
+// docs/methods/assumptions.md has a row for each that code can list, and the key that declares it.
 TEST(Assumptions, AreInTheirTable) {
-  const std::string page =
-      files::read_bytes(std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "docs/assumptions.md", std::size_t{1} << 20);
+  const std::string page = files::read_bytes(
+      std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "docs/methods/assumptions.md", std::size_t{1} << 20);
   Scenario limited = noisy_drive(1);
   limited.robot.limits = {{"effort", 1e3}, {"speed", 1e3}, {"acceleration", 1e3}};
   limited.sensors.pose = true;

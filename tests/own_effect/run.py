@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Adds an effect as docs/own_effect.md says and looks whether everything that the page promises is there.
+"""Adds an effect as docs/use/own_effect.md says and looks whether everything that the page promises is there.
 
     tests/own_effect/run.py --source SOURCE --build BUILD --scratch DIRECTORY
 
@@ -46,7 +46,7 @@ def run(command, cwd=None):
 def program_with(source, build, scratch):
     """The program, linked with the copy."""
     copy = scratch / "effect_law.cpp"
-    copy.write_text(patched(source / "model/effect_law.cpp", source / "docs/own_effect.md"), encoding="utf-8")
+    copy.write_text(patched(source / "model/effect_law.cpp", source / "docs/use/own_effect.md"), encoding="utf-8")
     commands = run(["ninja", "-t", "commands", "bin/wheelwright"], build).splitlines()
     original = str(source / "model/effect_law.cpp")
     for command in commands:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The diagnosis on the independent world: every effect under every law once, each with the least that is expected of
-// the answer (tests/long.sh slow). On the seed here; docs/gap.md has drawn ones.
+// the answer (tests/long.sh slow). On the seed here; docs/methods/gap.md has drawn ones.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -65,7 +65,7 @@ Answer judge(const Diagnosis& found, const std::string& truth) {
   return explained ? Answer::wrong : Answer::unexplained;
 }
 
-// "effect/law", as it is called in docs/gap.md.
+// "effect/law", as it is called in docs/methods/gap.md.
 std::string called(const Subject& subject) {
   return fmt::format("{}/{}", subject.entry->name, subject.law != nullptr ? subject.law->name : "given");
 }
