@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""One list of dependencies, cmake/dependencies.json, and everything that has to agree with it.
+"""One list of dependencies, tools/cmake/dependencies.json, and everything that has to agree with it.
 
     check_dependencies.py               exit code 1 where the build's files, tools/setup.sh, package.json or
                                         docs/inside/dependencies.md say something else
@@ -40,7 +40,7 @@ NOT_LISTED = {"Wheelwright", "Threads"}
 INTRODUCTION = """# Dependencies and licences
 
 Wheelwright is under [Apache-2.0](https://www.apache.org/licenses/LICENSE-2.0). This is what it is built, tested and
-documented with: Debian 12's packages, and uPlot from npm. The list is `cmake/dependencies.json`; this page is made from it
+documented with: Debian 12's packages, and uPlot from npm. The list is `tools/cmake/dependencies.json`; this page is made from it
 by `tools/check_dependencies.py --write`, and a test compares it with the build's files and `tools/setup.sh`. Licences are
 [SPDX](https://spdx.org/licenses/) expressions of the parts that are used, after Debian's copyright files; versions are those
 of Debian 12 without its own suffixes. The Debian package `wheelwright` has the part that is distributed as a CycloneDX bill
@@ -64,7 +64,7 @@ QUESTIONS = """## Licence questions
 
 
 def load(root):
-    return json.loads((root / "cmake/dependencies.json").read_text(encoding="utf-8"))["dependencies"]
+    return json.loads((root / "tools/cmake/dependencies.json").read_text(encoding="utf-8"))["dependencies"]
 
 
 def named_in_cmake(text):
@@ -102,8 +102,8 @@ def complaints(dependencies, in_library, in_build, setup, npm, page):
     out = []
 
     def compare(what, listed, there):
-        out.extend(f"{what} has {name}, cmake/dependencies.json has not" for name in sorted(there - listed))
-        out.extend(f"cmake/dependencies.json has {name}, {what} has not" for name in sorted(listed - there))
+        out.extend(f"{what} has {name}, tools/cmake/dependencies.json has not" for name in sorted(there - listed))
+        out.extend(f"tools/cmake/dependencies.json has {name}, {what} has not" for name in sorted(listed - there))
 
     def names(chosen):
         return {name for entry in dependencies if chosen(entry) for name in entry.get("cmake", [])}
@@ -116,7 +116,7 @@ def complaints(dependencies, in_library, in_build, setup, npm, page):
             out.append(f"{entry['name']}: unknown use or linked, or neither packages nor npm")
     if out:
         return out
-    compare("cmake/WheelwrightDependencies.cmake", names(lambda entry: entry["use"] == "library"), in_library)
+    compare("tools/cmake/WheelwrightDependencies.cmake", names(lambda entry: entry["use"] == "library"), in_library)
     compare("the build", names(lambda entry: True), in_build)
     for option in sorted(set(setup) | {setup_option(entry) for entry in dependencies}):
         listed = {name for entry in dependencies if setup_option(entry) == option for name in entry.get("packages", [])}
@@ -172,7 +172,7 @@ def bill_of_materials(dependencies, version):
 def gather(root):
     files = {path: path.read_text(encoding="utf-8") for path in cmake_files(root)}
     page = root / PAGE
-    return (load(root), named_in_cmake(files[root / "cmake/WheelwrightDependencies.cmake"]),
+    return (load(root), named_in_cmake(files[root / "tools/cmake/WheelwrightDependencies.cmake"]),
             set().union(*(named_in_cmake(text) for text in files.values())),
             setup_packages((root / "tools/setup.sh").read_text(encoding="utf-8")),
             json.loads((root / "results/report/package.json").read_text(encoding="utf-8"))["dependencies"],

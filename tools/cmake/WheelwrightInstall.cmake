@@ -7,7 +7,7 @@ install(EXPORT WheelwrightTargets NAMESPACE Wheelwright:: DESTINATION ${WHEELWRI
   COMPONENT development)
 get_property(WHEELWRIGHT_INSTALLED_ROOMS GLOBAL PROPERTY WHEELWRIGHT_ROOMS)
 list(TRANSFORM WHEELWRIGHT_INSTALLED_ROOMS REPLACE "^wheelwright_" "")
-configure_package_config_file(cmake/WheelwrightConfig.cmake.in ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake
+configure_package_config_file(tools/cmake/WheelwrightConfig.cmake.in ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake
   INSTALL_DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
 # Headers, with the includes that a program writes.
 get_property(headers GLOBAL PROPERTY WHEELWRIGHT_HEADERS)
@@ -20,6 +20,6 @@ include(\"${CMAKE_CURRENT_LIST_DIR}/InstalledHeaders.cmake\")" COMPONENT develop
 # Below 1.0 a minor version may change the interface.
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/WheelwrightConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake ${CMAKE_BINARY_DIR}/WheelwrightConfigVersion.cmake
-  cmake/WheelwrightDependencies.cmake DESTINATION ${WHEELWRIGHT_CMAKE_DIR} COMPONENT development)
+  tools/cmake/WheelwrightDependencies.cmake DESTINATION ${WHEELWRIGHT_CMAKE_DIR} COMPONENT development)
 # Debian's packages have their copyright file instead (WheelwrightPackage.cmake).
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT licence)

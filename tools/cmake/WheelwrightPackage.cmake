@@ -52,7 +52,7 @@ execute_process(COMMAND gzip -9nc ${papers}/changelog.Debian OUTPUT_FILE ${paper
 execute_process(COMMAND gzip -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md OUTPUT_FILE ${papers}/changelog.gz)
 foreach(component name IN ZIP_LISTS components names)
   # Not with `cmake --install`: these are the packages' own.
-  install(FILES cmake/debian/copyright ${papers}/changelog.Debian.gz ${papers}/changelog.gz
+  install(FILES tools/cmake/debian/copyright ${papers}/changelog.Debian.gz ${papers}/changelog.gz
     DESTINATION share/doc/${name} COMPONENT ${component} EXCLUDE_FROM_ALL)
 endforeach()
 
@@ -64,10 +64,10 @@ if(Python3_Interpreter_FOUND)
   install(FILES ${papers}/sbom.cdx.json DESTINATION share/doc/wheelwright COMPONENT program EXCLUDE_FROM_ALL)
 endif()
 
-# What the installed CMake package asks for, as Debian packages: everything in cmake/dependencies.json that is used by
+# What the installed CMake package asks for, as Debian packages: everything in tools/cmake/dependencies.json that is used by
 # the library.
-file(READ ${PROJECT_SOURCE_DIR}/cmake/dependencies.json dependencies)
-set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/dependencies.json)
+file(READ ${PROJECT_SOURCE_DIR}/tools/cmake/dependencies.json dependencies)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tools/cmake/dependencies.json)
 string(JSON count LENGTH "${dependencies}" dependencies)
 math(EXPR last "${count} - 1")
 set(development "")
@@ -98,7 +98,7 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ
   WORLD_EXECUTE)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/cmake/debian/compress.cmake)
+set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/tools/cmake/debian/compress.cmake)
 set(CPACK_COMPONENTS_ALL ${components})
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -139,8 +139,8 @@ if(TARGET wheelwright_python)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
     "python3 (>= 3.${Python3_VERSION_MINOR}~), python3 (<< 3.${next}), python3-numpy")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS python3-matplotlib)
-  set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/postinst
-    ${PROJECT_SOURCE_DIR}/cmake/debian/prerm)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/tools/cmake/debian/postinst
+    ${PROJECT_SOURCE_DIR}/tools/cmake/debian/prerm)
   set(CPACK_DEBIAN_PYTHON_DESCRIPTION "fault detection for wheeled robots, Python module
 ${what}
 
