@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What a build cost, from ninja's log: seconds of its compilations by room, and the dearest objects.
+"""What a build cost, from ninja's log: seconds of its compilations by module, and the dearest objects.
 
     tools/check_cost.py [BUILD]                  the table (BUILD: build)
     tools/check_cost.py [BUILD] --most SECONDS   ends with 1, naming it, where an object took longer
@@ -19,6 +19,8 @@ import sys
 import tempfile
 from collections import defaultdict
 from pathlib import Path
+
+import check_layers
 
 PROBE = """#include <Eigen/LU>
 double probe(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) { return a.partialPivLu().solve(b).norm(); }
@@ -39,17 +41,19 @@ def read_log(path):
     return objects
 
 
-def room_of(name):
-    parts = name.split("/")
-    return "/".join([parts[0], parts[2].removesuffix(".dir")]) if parts[0] == "tests" and len(parts) > 2 else parts[0]
+def module_of(name):
+    """The module of an object; of tests and benchmarks their program."""
+    folder, _, rest = name.partition("/CMakeFiles/")
+    module = check_layers.module_of(f"{folder}/object")
+    return f"{folder}/{rest.split('/')[0].removesuffix('.dir')}" if module == "tests" and rest else module
 
 
 def table(objects, dearest):
-    rooms = defaultdict(float)
+    modules = defaultdict(float)
     for name, seconds in objects.items():
-        rooms[room_of(name)] += seconds
-    lines = [f"{seconds:8.1f} s  {room}" for room, seconds in sorted(rooms.items(), key=lambda item: -item[1])]
-    lines.append(f"{sum(rooms.values()):8.1f} s  {len(objects)} objects")
+        modules[module_of(name)] += seconds
+    lines = [f"{seconds:8.1f} s  {module}" for module, seconds in sorted(modules.items(), key=lambda item: -item[1])]
+    lines.append(f"{sum(modules.values()):8.1f} s  {len(objects)} objects")
     lines.append("dearest:")
     for name, seconds in sorted(objects.items(), key=lambda item: -item[1])[:dearest]:
         lines.append(f"{seconds:8.1f} s  {name}")
@@ -90,7 +94,8 @@ def self_test():
         objects = read_log(log)
         assert objects == {"old.o": 0.5, "core/CMakeFiles/c.dir/a.o": 1.0, "gap/CMakeFiles/g.dir/b.o": 26.0,
                            "tests/CMakeFiles/test_core.dir/t.o": 2.0}, objects
-        assert room_of("tests/CMakeFiles/test_core.dir/t.o") == "tests/test_core"
+        assert module_of("tests/CMakeFiles/test_core.dir/t.o") == "tests/test_core"
+        assert module_of(f"{check_layers.MODULES['filter']}/CMakeFiles/wheelwright_filter.dir/f.o") == "filter"
         assert "29.5 s  4 objects" in table(objects, 1) and table(objects, 1).endswith("b.o")
         assert len(complaints(objects, 25.0, 1.0)) == 1 and not complaints(objects, 25.0, 1.1)
         log.write_text("something else\n", encoding="utf-8")

@@ -260,7 +260,7 @@ def main():
         if not arguments.built:
             build(arguments.build)
         kept = set(re.findall(r"(\w+)(?=\()", "\n".join(others)))
-        objects = [path for room in PRODUCT for path in sorted((arguments.build / room).rglob("*.o"))]
+        objects = [path for folder in check_layers.MODULES.values() for path in sorted((arguments.build / folder).glob("CMakeFiles/**/*.o"))]
         unreached, everywhere = find_unreached(everything(arguments.build, objects), linked(arguments.build))
         found = sorted({*unreached_functions(unreached, texts, kept), *never_compiled(texts, everywhere), *found})
         watchers = [path for path in sorted((ROOT / "tests").rglob("*.[ch]pp"))
