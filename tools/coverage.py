@@ -42,7 +42,7 @@ def counts_of(folder, root):
         if path not in names:
             real = Path(path).resolve()
             inside = real.relative_to(root).as_posix() if real.is_relative_to(root) else ""
-            names[path] = inside if inside.split("/")[0] in PRODUCT else None
+            names[path] = inside if check_layers.module_of(inside) in PRODUCT else None
         return names[path]
 
     for notes in sorted(folder.rglob("*.gcno")):

@@ -34,7 +34,7 @@ OPTIONS = ["-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=", f"-DCMAKE_CXX
            "-DCMAKE_EXE_LINKER_FLAGS=-Wl,--gc-sections", "-DCMAKE_MODULE_LINKER_FLAGS=-Wl,--gc-sections,--exclude-libs,ALL",
            "-DWHEELWRIGHT_TESTS=OFF", "-DWHEELWRIGHT_BENCH=OFF"]
 OTHERS = re.compile(r"_Z(?:NK?|T\w)?(?:S|5Eigen|5ceres|3fmt|8nlohmann|4YAML|8pybind11|3CLI|9__gnu_cxx|5boost)")
-PLACE = re.compile(r"(?:^|/)(\w+/\w+\.[ch]pp):(\d+)")
+PLACE = re.compile(r"([\w/.-]+\.[ch]pp):(\d+)")
 DECLARED = re.compile(
     r"^\s*(?:(?:template\s*<[^;{}]*>|\[\[\w+\]\]|inline|static|constexpr|explicit|virtual|friend|extern|const)\s+)*"
     r"(?:(?:struct|class|enum(?:\s+class)?|using|concept)\s+(\w+)|[\w:][\w:<>,*&\s]*?[\s*&>](\w+)\s*(?:\(|=|;|\{))")
@@ -64,6 +64,12 @@ def functions_in(binary):
     return own, shared
 
 
+def in_the_product(path):
+    """The path from the root of a product's file, however it is named; None of others."""
+    parts = path.split("/")
+    return next((name for name in ("/".join(parts[k:]) for k in range(len(parts))) if check_layers.module_of(name) in PRODUCT), None)
+
+
 def places(binary, functions):
     """(file, line) -> names of the functions that begin there, of those in a room's folder."""
     asked = [(address, name) for name, addresses in functions.items() for address in addresses]
@@ -72,8 +78,9 @@ def places(binary, functions):
     found = defaultdict(set)
     for (_, name), answer in zip(asked, answers):
         at = PLACE.search(answer)
-        if at:
-            found[at.group(1), int(at.group(2))].add(name)
+        file = at and in_the_product(at.group(1))
+        if file:
+            found[file, int(at.group(2))].add(name)
     return found
 
 
