@@ -6,11 +6,13 @@
 #   tools/setup.sh program  Debian packages for the program, and uPlot from npm
 #   tools/setup.sh          the same and what tests, benchmarks, Python and the independent world need
 #   tools/setup.sh --ci     the same and clang-format, clang-tidy and clang, which continuous integration uses, and what some
-#                           tests need that are skipped elsewhere: a browser, shells, man (half a minute, nearly all of it
-#                           Chromium's)
+#                           tests need that are skipped elsewhere: a browser, shells, man, matplotlib, … (half a minute,
+#                           nearly all of it Chromium's)
 #   tools/setup.sh --fuzz   the same as without and clang with its run-time libraries
 #   tools/setup.sh --docs, tools/setup.sh --packages
 #                           the same as without and what tools/docs.sh, tools/package.sh and tools/check_package.sh need
+#
+# tools/setup.sh --list [program | --ci | ...] names these Debian packages, one a line, and installs nothing.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -22,18 +24,28 @@ packages="g++ cmake ninja-build pkg-config
 everything="libopenmpi-dev openmpi-bin
   libgtest-dev libgmock-dev librapidcheck-dev python3-jsonschema
   libbenchmark-dev coinor-libclp-dev libglpk-dev liblapack-dev libqsopt-ex-dev libmujoco-dev
-  pybind11-dev python3 python3-dev python3-numpy"
+  pybind11-dev python3 python3-dev python3-numpy python3-pandas"
+list=''
+if [ "${1:-}" = --list ]; then
+  list=yes
+  shift
+fi
 case "${1:-}" in
   program) everything= ;;
   '') ;;
-  --ci) everything="$everything clang clang-format clang-tidy python3-mypy python3-matplotlib python3-pandas
-    chromium zsh fish man-db groff-base" ;;
+  --ci) everything="$everything clang clang-format clang-tidy python3-mypy python3-matplotlib python3-dask
+    chromium zsh fish man-db groff-base systemd" ;;
   --fuzz) everything="$everything clang-14 libclang-rt-14-dev" ;;
   --docs) everything="$everything python3-sphinx python3-myst-parser python3-sphinxcontrib.bibtex doxygen graphviz" ;;
   --packages) everything="$everything dpkg-dev file fakeroot lintian debootstrap" ;;
-  *) echo "usage: tools/setup.sh [program | --ci | --fuzz | --docs | --packages]" >&2; exit 2 ;;
+  *) echo "usage: tools/setup.sh [--list] [program | --ci | --fuzz | --docs | --packages]" >&2; exit 2 ;;
 esac
 packages="$packages $everything"
+if [ -n "$list" ]; then
+  # shellcheck disable=SC2086
+  printf '%s\n' $packages
+  exit 0
+fi
 
 # install PACKAGE...: the ones that dpkg does not have.
 install() {
