@@ -4,8 +4,11 @@
 import functools
 import json
 import os
+import re
 import subprocess
+import sys
 import tempfile
+import textwrap
 from pathlib import Path
 
 import wheelwright as ww
@@ -15,6 +18,7 @@ PROGRAM = os.environ["WHEELWRIGHT_PROGRAM"]
 ROBOT = SOURCE / "examples" / "robot.yaml"
 HEALTHY = SOURCE / "examples" / "healthy.csv.gz"
 SCENARIOS = SOURCE / "examples" / "scenarios"
+PACKAGE = Path(ww.__file__).parent
 
 
 _URDF = """<robot name="cart">
@@ -29,6 +33,20 @@ _WHEEL = """<link name="{0}"><inertial><mass value="0.5"/><inertia ixx="1e-3" iy
     <limit effort="6" velocity="30"/></joint>"""
 # A cart on two driven wheels, 0.4 m apart.
 CART = _URDF.format(_WHEEL.format("left", 0.2) + _WHEEL.format("right", -0.2))
+
+
+def python(*command, **environment):
+    """The outcome of this interpreter with the arguments `command`."""
+    return subprocess.run([sys.executable, *map(str, command)], capture_output=True, text=True, timeout=300,
+                          env={**os.environ, **environment})
+
+
+def page_code():
+    """The code that docs/use/python.md shows before "Installing", and of it, apart, the lines that draw."""
+    page = (SOURCE / "docs" / "python.md").read_text()
+    lines = "".join(re.search(r"((?:^ {4}.*\n|^\n)+)", page[page.index(first):], re.M).group(1)
+                    for first in ("    import numpy", "    health = ")).splitlines(keepends=True)
+    return tuple(textwrap.dedent("".join(line for line in lines if ("ww.plot." in line) == draws)) for draws in (False, True))
 
 
 def program(*arguments):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The package as a package: its types, its wheel."""
+"""The package as a package: its stub, its page, its wheel."""
 
 import ast
 import base64
@@ -12,23 +12,14 @@ import io
 import os
 import re
 import shutil
-import subprocess
-import sys
-import textwrap
 import unittest
 import zipfile
 from pathlib import Path
 
+import skip
 import wheelwright as ww
 import wheelwright._core as core
-from support import CART, HEALTHY, ROBOT, SOURCE, fault_file, path
-
-PACKAGE = Path(ww.__file__).parent
-
-
-def run(*command, **environment):
-    return subprocess.run([sys.executable, *map(str, command)], capture_output=True, text=True, timeout=300,
-                          env={**os.environ, **environment})
+from support import CART, HEALTHY, PACKAGE, ROBOT, SOURCE, fault_file, page_code, path, python
 
 
 def arguments_of(thing):
@@ -86,31 +77,6 @@ class Types(unittest.TestCase):
             if not is_property:
                 self.assertEqual(arguments_in_stub(each), arguments_of(value), f"{name}.{key}")
 
-    def mypy(self, *arguments):
-        if importlib.util.find_spec("mypy") is None:
-            # .ci/run sets it, and installs all that tests need.
-            self.assertNotEqual(os.environ.get("WHEELWRIGHT_NO_SKIPS"), "1", "mypy is not installed")
-            self.skipTest("mypy is not installed")
-        return run(*arguments, MYPYPATH=str(PACKAGE.parent), MYPY_CACHE_DIR=str(path("mypy")))
-
-    def test_package_and_examples_are_strictly_typed(self):
-        # matplotlib 3.6 and pandas 1.5 have no types.
-        path("mypy.ini").write_text("[mypy]\nstrict = True\n[mypy-matplotlib.*,pandas.*]\nignore_missing_imports = True\n")
-        done = self.mypy("-m", "mypy", "--config-file", path("mypy.ini"), "-p", "wheelwright")
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        for example in ("commission_a_bag.py", "morning.py"):
-            done = self.mypy("-m", "mypy", "--config-file", path("mypy.ini"), SOURCE / "examples" / example)
-            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-
-    def test_wrong_use_is_found(self):
-        path("wrong.py").write_text("import wheelwright as ww\n"
-                                    "log = ww.read_log('a.csv')\n"
-                                    "ww.commission(log, 'robot.yaml')\n"
-                                    "ww.Detector(ww.read_model('m.json'), set='polygon')\n")
-        done = self.mypy("-m", "mypy", "--strict", path("wrong.py"))
-        self.assertIn("wrong.py:3:", done.stdout)
-        self.assertIn("wrong.py:4:", done.stdout)
-
     def test_everything_public_says_what_it_is(self):
         for name in ww.__all__:
             thing = getattr(ww, name)
@@ -119,9 +85,10 @@ class Types(unittest.TestCase):
 
 class Page(unittest.TestCase):
     def test_its_first_examples_run(self):
-        page = (SOURCE / "docs" / "python.md").read_text()
-        code = "".join(re.search(r"((?:^ {4}.*\n|^\n)+)", page[page.index(first):], re.M).group(1)
-                       for first in ("    import numpy", "    health = "))
+        skip.skip_unless(self, importlib.util.find_spec("pandas"), "pandas is not installed")
+        code, pictures = page_code()  # tests/python/test_plot.py draws them
+        self.assertIn("to_dataframe", code)
+        self.assertTrue(pictures)
         # As it stands there it takes ten seconds.
         for quick, options in (("baseline=log", "shrink=False, manoeuvre=False"), ("radius=1.5", "stages=1, duration=6.0"),
                                ('"caster_drag"], speed=8.0', "stages=1, duration=6.0")):
@@ -139,7 +106,7 @@ class Page(unittest.TestCase):
         os.chdir(place)
         try:
             with contextlib.redirect_stdout(io.StringIO()):
-                exec(textwrap.dedent(code), names)
+                exec(code, names)
         finally:
             os.chdir(before)
         self.assertTrue(names["run"].fault and names["found"].fault)
@@ -152,8 +119,8 @@ class Page(unittest.TestCase):
 class Wheel(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        done = run(SOURCE / "python" / "make_wheel.py", PACKAGE, "--version", ww.__version__, "--license",
-                   SOURCE / "LICENSE", "--out", path("dist"))
+        done = python(SOURCE / "python" / "make_wheel.py", PACKAGE, "--version", ww.__version__, "--license",
+                      SOURCE / "LICENSE", "--out", path("dist"))
         assert done.returncode == 0, done.stderr
         cls.wheel = Path(done.stdout.strip())
 
@@ -180,16 +147,16 @@ class Wheel(unittest.TestCase):
     def test_it_works_where_it_is_installed(self):
         place = path("site")
         if importlib.util.find_spec("pip") is not None:
-            done = run("-m", "pip", "install", "--no-index", "--no-deps", "--quiet", "--disable-pip-version-check",
-                       "--root-user-action=ignore", "--target", place, self.wheel)
+            done = python("-m", "pip", "install", "--no-index", "--no-deps", "--quiet", "--disable-pip-version-check",
+                          "--root-user-action=ignore", "--target", place, self.wheel)
             self.assertEqual(done.returncode, 0, done.stderr)
         else:
             zipfile.ZipFile(self.wheel).extractall(place)
-        done = run("-c", f"import wheelwright as ww; print(ww.__file__, ww.read_robot({str(ROBOT)!r}).name)",
-                   PYTHONPATH=str(place))
+        done = python("-c", f"import wheelwright as ww; print(ww.__file__, ww.read_robot({str(ROBOT)!r}).name)",
+                      PYTHONPATH=str(place))
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(done.stdout.split(), [str(place / "wheelwright" / "__init__.py"), "example"])
 
 
 if __name__ == "__main__":
-    unittest.main()
+    skip.main()

@@ -3,20 +3,17 @@
 
 import importlib.util
 import io
-import os
 import unittest
 
 import numpy as np
+import skip
 import wheelwright as ww
-from support import commissioned, fault_file, healthy_log, model_file, robot, straight_log
+from support import commissioned, fault_file, healthy_log, model_file, page_code, robot, straight_log
 
 
 class Plot(unittest.TestCase):
     def setUp(self):
-        if importlib.util.find_spec("matplotlib") is None:
-            # .ci/run sets it, and installs all that tests need.
-            self.assertNotEqual(os.environ.get("WHEELWRIGHT_NO_SKIPS"), "1", "matplotlib is not installed")
-            self.skipTest("matplotlib is not installed")
+        skip.skip_unless(self, importlib.util.find_spec("matplotlib"), "matplotlib is not installed")
         import matplotlib
         matplotlib.use("Agg")
         import matplotlib.pyplot
@@ -91,6 +88,10 @@ class Plot(unittest.TestCase):
         np.testing.assert_array_equal(ax.lines[0].get_ydata(), series.nominal)
         np.testing.assert_array_equal(ax.lines[1].get_ydata(), series.after)
 
+    def test_what_the_page_draws(self):
+        exec(page_code()[1], {"ww": ww, "run": self.run_of_fault()})
+        self.assertEqual(len(self.plt.get_fignums()), 1)
+
     def test_axes_that_are_given_are_used(self):
         figure, axes = self.plt.subplots(1, 2)
         self.assertIs(ww.plot.parameters(commissioned(), ax=axes[1]), axes[1])
@@ -107,4 +108,4 @@ class Plot(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    skip.main()

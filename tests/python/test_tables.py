@@ -4,12 +4,12 @@
 import functools
 import html.parser
 import importlib.util
-import os
 import subprocess
 import sys
 import unittest
 
 import numpy as np
+import skip
 import wheelwright as ww
 from support import HEALTHY, SCENARIOS, commissioned, fault_file, healthy_log, path, robot, straight_log
 
@@ -108,10 +108,7 @@ class Notebook(unittest.TestCase):
 
 class Frames(unittest.TestCase):
     def setUp(self):
-        if importlib.util.find_spec("pandas") is None:
-            # .ci/run sets it, and installs all that tests need.
-            self.assertNotEqual(os.environ.get("WHEELWRIGHT_NO_SKIPS"), "1", "pandas is not installed")
-            self.skipTest("pandas is not installed")
+        skip.skip_unless(self, importlib.util.find_spec("pandas"), "pandas is not installed")
 
     def frame(self, kind):
         result = next(r for r in results() if isinstance(r, kind))
@@ -184,4 +181,4 @@ class WithoutPandas(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    skip.main()
