@@ -20,7 +20,7 @@ cp "$packages"/*.deb "$root/packages/"
 cat > "$root/packages/CMakeLists.txt" <<'END'
 cmake_minimum_required(VERSION 3.25)
 project(Stranger LANGUAGES CXX)
-find_package(Wheelwright 0.1 REQUIRED COMPONENTS io)
+find_package(Wheelwright 0.1 REQUIRED COMPONENTS results)
 add_executable(stranger stranger.cpp)
 target_link_libraries(stranger PRIVATE Wheelwright::results)
 END

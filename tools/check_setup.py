@@ -35,7 +35,7 @@ PROGRAMS = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 EMPTIED = ("/usr/local", "/opt", "/home", "/root")
 SWEPT = ("/usr/bin", "/usr/sbin", "/usr/games", "/usr/lib/python3/dist-packages")
 # Over this directory of the namespace the layers and the view are mounted.
-PLACE = "/mnt"
+PLACE = "/media" if "/mnt" in map(str, ROOT.parents) else "/mnt"
 
 
 class Refused(Exception):
@@ -138,7 +138,7 @@ def make_view(allowed, planted):
         raise Refused("/usr, /etc or /var/lib/dpkg is a file system of its own: expected all in that of /")
     mount("-t", "tmpfs", "wheelwright-setup", PLACE)
     lower, upper, view = "/", f"{PLACE}/upper", f"{PLACE}/view"
-    for folder in (upper, view, f"{PLACE}/work"):
+    for folder in (upper, view, f"{PLACE}/scratch"):
         os.mkdir(folder)
     installed = read_status((DPKG / "status").read_text(encoding="utf-8"))
     for path, text in planted.items():
@@ -156,7 +156,7 @@ def make_view(allowed, planted):
         stanzas = (DPKG / "status").read_text(encoding="utf-8").strip().split("\n\n")
         known = [stanza + "\n" for stanza in stanzas if re.match(r"Package: (.*)", stanza)[1] in allowed]
         Path(f"{upper}{DPKG}/status").write_text("\n".join(known), encoding="utf-8")
-    mount("-t", "overlay", "wheelwright-setup", "-o", f"lowerdir={lower},upperdir={upper},workdir={PLACE}/work", view)
+    mount("-t", "overlay", "wheelwright-setup", "-o", f"lowerdir={lower},upperdir={upper},workdir={PLACE}/scratch", view)
     for path in ("/proc", "/sys", "/dev", "/tmp", *(name for name in ("/etc/hosts", "/etc/resolv.conf") if os.path.ismount(name))):
         mount("--rbind", path, view + path)
     if allowed is not None:

@@ -7,13 +7,13 @@
 #   tools/fresh_root.sh DIRECTORY [COMMAND...]
 #
 # DIRECTORY gets the Debian (made when it is not there) and, in it, a fresh clone of the last commit at /wheelwright.
-# COMMAND is run there by sh; without one: ./tests/run.sh && ./examples/commission.sh. What this machine needs to reach
+# COMMAND is run there by sh; without one: ./examples/commission.sh && ./tests/run.sh. What this machine needs to reach
 # its package registries (apt's and npm's configuration, certificates, proxy and certificate variables) is copied.
 # Further environment: SUITE (bookworm), MIRROR (http://deb.debian.org/debian).
 set -eu
 root=${1:?usage: tools/fresh_root.sh DIRECTORY [COMMAND...]}
 shift
-command=${*:-'./tests/run.sh && ./examples/commission.sh'}
+command=${*:-'./examples/commission.sh && ./tests/run.sh'}
 source=$(cd "$(dirname "$0")/.." && pwd)
 suite=${SUITE:-bookworm}
 mirror=${MIRROR:-http://deb.debian.org/debian}
