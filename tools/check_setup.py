@@ -19,10 +19,10 @@ import argparse
 import functools
 import os
 import re
-import shutil
 import stat
 import subprocess
 import sys
+import tempfile
 import traceback
 from pathlib import Path
 
@@ -51,8 +51,9 @@ def read_status(text):
         if not fields.get("Status", "").endswith(" ok installed"):
             continue
         names = lambda part: [re.match(r"\s*([^\s:(]+)", name)[1] for name in part]
-        depends = [names(part.split("|")) for key in ("Pre-Depends", "Depends") for part in fields.get(key, "").split(",") if part.strip()]
-        provides = names([part for part in fields.get("Provides", "").split(",") if part.strip()])
+        parts = lambda key: [part for part in fields.get(key, "").split(",") if part.strip()]
+        depends = [names(part.split("|")) for part in parts("Pre-Depends") + parts("Depends")]
+        provides = names(parts("Provides"))
         needed = fields.get("Essential") == "yes" or fields.get("Priority") == "required"
         packages[fields["Package"]] = (depends, provides, needed)
     return packages
@@ -100,10 +101,8 @@ def files_of(packages):
     return out
 
 
-def covered(kept, hidden):
-    """The topmost paths that hold nothing of `kept`: those of `hidden`, and what no package has among programs and Python
-    modules."""
-    swept = {os.path.join(folder, name) for folder in SWEPT if os.path.isdir(folder) for name in os.listdir(folder)}
+def covered(kept, hidden, swept):
+    """The topmost paths that hold nothing of `kept`: those of `hidden`, and of `swept` what is no link to what is kept."""
     out = {path for path in swept if path not in kept and os.path.realpath(path) not in kept}
     for path in hidden - kept:
         if path.startswith(("/usr/", "/etc/")):
@@ -133,11 +132,10 @@ def mount(*words):
 def make_view(allowed, planted):
     """Mounts the view in this process's mount namespace; returns its directory. `planted`: path -> text of files that are
     there before anything is covered."""
-    devices = {path: os.stat(path).st_dev for path in ("/", "/usr", "/etc", "/var/lib/dpkg")}
-    if len(set(devices.values())) != 1:
+    if len({os.stat(path).st_dev for path in ("/", "/usr", "/etc", "/var/lib/dpkg")}) != 1:
         raise Refused("/usr, /etc or /var/lib/dpkg is a file system of its own: expected all in that of /")
     mount("-t", "tmpfs", "wheelwright-setup", PLACE)
-    lower, upper, view = "/", f"{PLACE}/upper", f"{PLACE}/view"
+    upper, view = f"{PLACE}/upper", f"{PLACE}/view"
     for folder in (upper, view, f"{PLACE}/scratch"):
         os.mkdir(folder)
     installed = read_status((DPKG / "status").read_text(encoding="utf-8"))
@@ -146,8 +144,9 @@ def make_view(allowed, planted):
         Path(upper + path).write_text(text, encoding="utf-8")
         os.chmod(upper + path, 0o755)
     if allowed is not None:
-        kept = files_of(allowed)
-        for path in covered(kept, files_of(set(installed) - allowed)) | {path for path in planted if path.startswith(SWEPT)}:
+        swept = {os.path.join(folder, name) for folder in SWEPT if os.path.isdir(folder) for name in os.listdir(folder)}
+        swept.update(path for path in planted if path.startswith(SWEPT))
+        for path in covered(files_of(allowed), files_of(set(installed) - allowed), swept):
             make_parents(upper, path)
             if os.path.lexists(upper + path):
                 os.unlink(upper + path)
@@ -156,8 +155,9 @@ def make_view(allowed, planted):
         stanzas = (DPKG / "status").read_text(encoding="utf-8").strip().split("\n\n")
         known = [stanza + "\n" for stanza in stanzas if re.match(r"Package: (.*)", stanza)[1] in allowed]
         Path(f"{upper}{DPKG}/status").write_text("\n".join(known), encoding="utf-8")
-    mount("-t", "overlay", "wheelwright-setup", "-o", f"lowerdir={lower},upperdir={upper},workdir={PLACE}/scratch", view)
-    for path in ("/proc", "/sys", "/dev", "/tmp", *(name for name in ("/etc/hosts", "/etc/resolv.conf") if os.path.ismount(name))):
+    mount("-t", "overlay", "wheelwright-setup", "-o", f"lowerdir=/,upperdir={upper},workdir={PLACE}/scratch", view)
+    mounted = [path for path in ("/etc/hosts", "/etc/resolv.conf") if os.path.ismount(path)]  # as containers have them
+    for path in ("/proc", "/sys", "/dev", "/tmp", *mounted):
         mount("--rbind", path, view + path)
     if allowed is not None:
         for path in EMPTIED:
@@ -177,8 +177,10 @@ def make_view(allowed, planted):
 
 
 def setup_packages(mode):
-    listed = subprocess.run([ROOT / "tools/setup.sh", "--list", *mode], capture_output=True, text=True, check=True).stdout.split()
-    return [*BARE, *listed]
+    listed = subprocess.run([ROOT / "tools/setup.sh", "--list", *mode], stdout=subprocess.PIPE, text=True, check=False)
+    if listed.returncode != 0:
+        raise Refused(f"tools/setup.sh --list {' '.join(mode)} failed")
+    return [*BARE, *listed.stdout.split()]
 
 
 def allowed_packages(mode):
@@ -220,25 +222,31 @@ def self_test():
 
     planted = {"/usr/bin/wheelwright-planted": "#!/bin/sh\n", "/usr/lib/python3/dist-packages/wheelwright_planted.py": "",
                "/usr/local/bin/wheelwright-planted-too": "#!/bin/sh\n"}
-    look = ("for name in wheelwright-planted wheelwright-planted-too c++ git; do command -v $name; done\n"
-            "for name in wheelwright_planted numpy; do /usr/bin/python3 -c \"import $name; print('$name')\" 2>/dev/null; done\n"
-            "tools/setup.sh --list | head -1; exit 5\n")
     allowed = allowed_packages([])
+    others = files_of(set(read_status((DPKG / "status").read_text(encoding="utf-8"))) - allowed) - files_of(allowed)
+    # Of packages that set-up does not install, as far as this machine has any.
+    foreign = sorted(path for path in others if re.fullmatch(r"/usr/bin/[a-z]\w*", path) and os.path.isfile(path))[:3]
+    modules = [path.split("/")[-2] for path in sorted(others)
+               if re.fullmatch(r"/usr/lib/python3/dist-packages/[a-z]\w*/__init__[.]py", path)][:3]
+    programs = [path.split("/")[-1] for path in planted if "/bin/" in path] + [path.split("/")[-1] for path in foreign]
+    modules.append("wheelwright_planted")
+    look = (f"for name in {' '.join(programs)} c++ git; do command -v $name >/dev/null && echo $name; done\n"
+            f"for name in {' '.join(modules)} numpy; do /usr/bin/python3 -c \"import importlib.util, sys; "
+            "sys.exit(importlib.util.find_spec('$name') is None)\" && echo $name; done\n"
+            "dpkg-query -W -f='${Package}\\n' g++; exit 5\n")
     found = {}
     for name, packages in (("everything", None), ("the view", allowed)):
-        reader, writer = os.pipe()
-        saved = os.dup(1)
-        os.dup2(writer, 1)
-        code = enter(packages, planted, ["/bin/sh", "-c", look])
-        os.dup2(saved, 1)
-        os.close(writer)
-        with os.fdopen(reader) as output:
+        with tempfile.TemporaryFile("w+") as output:
+            saved = os.dup(1)
+            os.dup2(output.fileno(), 1)
+            code = enter(packages, planted, ["/bin/sh", "-c", look])
+            os.dup2(saved, 1)
+            os.close(saved)
+            output.seek(0)
             found[name] = output.read().split()
         assert code == 5, (name, code, found)
-    seen = ["/usr/bin/wheelwright-planted", "/usr/local/bin/wheelwright-planted-too", "/usr/bin/c++", "/usr/bin/git",
-            "wheelwright_planted", "numpy", "g++"]
-    assert found["everything"] == seen, found
-    assert found["the view"] == [word for word in seen if "planted" not in word], found
+    assert found["everything"] == [*programs, "c++", "git", *modules, "numpy", "g++"], found
+    assert found["the view"] == ["c++", "git", "numpy", "g++"], found
     print("check_setup: self-test passed")
 
 
