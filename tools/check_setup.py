@@ -19,6 +19,7 @@ import argparse
 import functools
 import os
 import re
+import shutil
 import stat
 import subprocess
 import sys
@@ -103,12 +104,12 @@ def files_of(packages):
 
 def covered(kept, hidden, swept):
     """The topmost paths that hold nothing of `kept`: those of `hidden`, and of `swept` what is no link to what is kept."""
-    out = {path for path in swept if path not in kept and os.path.realpath(path) not in kept}
-    for path in hidden - kept:
-        if path.startswith(("/usr/", "/etc/")):
-            while (parent := os.path.dirname(path)) not in kept:
-                path = parent
-            out.add(path)
+    out = set()
+    for path in [path for path in hidden - kept if path.startswith(("/usr/", "/etc/"))] + [
+            path for path in swept if path not in kept and os.path.realpath(path) not in kept]:
+        while (parent := os.path.dirname(path)) not in kept:
+            path = parent
+        out.add(path)
     return out
 
 
@@ -148,7 +149,9 @@ def make_view(allowed, planted):
         swept.update(path for path in planted if path.startswith(SWEPT))
         for path in covered(files_of(allowed), files_of(set(installed) - allowed), swept):
             make_parents(upper, path)
-            if os.path.lexists(upper + path):
+            if os.path.isdir(upper + path):
+                shutil.rmtree(upper + path)
+            elif os.path.lexists(upper + path):
                 os.unlink(upper + path)
             os.mknod(upper + path, stat.S_IFCHR, 0)
         make_parents(upper, DPKG / "status")
@@ -268,7 +271,11 @@ def main():
             raise Refused("only root can hide what set-up does not install: expected to be run as root")
         if "WHEELWRIGHT_SETUP_NAMESPACE" not in os.environ:
             os.environ["WHEELWRIGHT_SETUP_NAMESPACE"] = "1"
-            os.execvp("unshare", ["unshare", "--mount", "--propagation", "private", sys.executable, *sys.argv])
+            unshare = ["unshare", "--mount", "--propagation", "private"]
+            probe = subprocess.run([*unshare, "true"], capture_output=True, text=True, check=False)
+            if probe.returncode != 0:
+                raise Refused(f"{probe.stderr.strip()}: expected a machine that lets root make a mount namespace")
+            os.execvp("unshare", [*unshare, sys.executable, *sys.argv])
         if arguments.self_test:
             self_test()
             return 0
