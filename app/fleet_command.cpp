@@ -103,8 +103,8 @@ bool is_result(const robots::FleetListRobot& robot, const Arguments& a) {
   return own && (out || !logs.empty());
 }
 
-// The robots of LIST, without what an earlier run wrote among their logs. Throws InputError where a result would replace
-// a file of theirs.
+// The robots of LIST, without what an earlier run wrote among their logs. Throws InputError where a result would
+// replace a file of theirs.
 std::vector<robots::FleetListRobot> robots_of(const Arguments& a) {
   std::vector<robots::FleetListRobot> robots = robots::read_fleet(a.list);
   if (!a.common.out.empty() && std::filesystem::is_directory(a.list)) {
@@ -165,8 +165,8 @@ std::string command_of(const Arguments& a) {
   return out + " --out DIR";
 }
 
-/// The files of robots as they were when first asked for: a result belongs to these. A shard asks for its own alone. For
-/// several threads at once.
+/// The files of robots as they were when first asked for: a result belongs to these. A shard asks for its own alone.
+/// For several threads at once.
 class FirstFiles {
  public:
   explicit FirstFiles(const std::vector<robots::FleetListRobot>& robots) : robots_(robots), first_(robots.size()) {}

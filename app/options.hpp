@@ -67,8 +67,8 @@ void add_test(CLI::App& command, detector::Test& test);
 /// Makes an option take quantities with units: what the option itself converts is the number in `unit` (quantity()).
 [[nodiscard]] CLI::Validator in_unit(const std::string& unit);
 
-/// Makes all options of the commands of `program` refuse an empty value, as of a variable that is not set, and those that
-/// take a number N a sign and more than 64 bits.
+/// Makes all options of the commands of `program` refuse an empty value, as of a variable that is not set, and those
+/// that take a number N a sign and more than 64 bits.
 void refuse_mistaken_values(CLI::App& program);
 /// Throws CLI::ValidationError where one of `words` is --OPTION= without a value, whose value would be the next word.
 void refuse_lost_values(const std::vector<std::string>& words);

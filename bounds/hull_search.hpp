@@ -15,10 +15,10 @@ namespace wheelwright::bounds {
 
 /// Cuts a set with rows in memory until its 2p vertices where a parameter is largest or smallest satisfy all of them.
 ///
-/// Rows come in portions, each as long as all before it (up to 262 144 rows), so that most are looked at when the set is
-/// small already. Those that a box around it implies never matter again. Those that a vertex violates are cut in; those
-/// that one nearly violates are kept at hand, since the next vertex may. Then all are looked at once more, and again until
-/// no vertex has moved by more than the rows that are not at hand leave.
+/// Rows come in portions, each as long as all before it (up to 262 144 rows), so that most are looked at when the set
+/// is small already. Those that a box around it implies never matter again. Those that a vertex violates are cut in;
+/// those that one nearly violates are kept at hand, since the next vertex may. Then all are looked at once more, and
+/// again until no vertex has moved by more than the rows that are not at hand leave.
 class HullSearch {
  public:
   /// `information` as in CuttingPlanes. `threads` look at rows; the result does not depend on their number.

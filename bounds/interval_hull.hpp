@@ -110,9 +110,9 @@ struct IntervalHull {
 /// Interval hull of { θ in prior : |y − Y°θ| <= dy, |Y° − Y| <= dY for every row }.
 ///
 /// A set is cut with an evenly spread sample first (some 16 000 rows); then the rows are compared with a box around the
-/// set held and those that may cut with the 2p vertices where a parameter is smallest or largest, until these satisfy all
-/// of them. Rows in memory are read once, and once more as far as they may matter (hull_search.hpp: one pass); a source
-/// is walked twice (the first pass surveys it, the second keeps what may cut), as long as the rows
+/// set held and those that may cut with the 2p vertices where a parameter is smallest or largest, until these satisfy
+/// all of them. Rows in memory are read once, and once more as far as they may matter (hull_search.hpp: one pass); a
+/// source is walked twice (the first pass surveys it, the second keeps what may cut), as long as the rows
 /// that matter fit into `most_rows`. Bounds are certified (certificate.hpp). Signs that the prior leaves open in noisy
 /// columns are relaxed to the chords of SlabRows; feasible_set() examines them one by one.
 ///

@@ -76,11 +76,11 @@ struct Table {
   /// that are raised to the largest |Y_j| of all rows, and to the largest |y|.
   std::size_t (*scan)(const Slabs& slabs, const double* centre, const double* half, const double* least,
                       const Oblique* oblique, double floor, std::uint32_t* found, double* peaks);
-  /// Numbers of the rows without |y − Y·x| <= share (dy + Σ dY_j |x_j|) for all points x, ascending; how many. Rows that
-  /// hold a NaN are among them. `found` has room for n. `open`, unless null, one for every kLanes rows: where it is 0 they
-  /// are not looked at, and it is set to 0 where the box implies all of them. `most`, unless null, is raised to the
-  /// largest Σ (|Y_j| + dY_j) half_j / (dy + Σ dY_j least_j) of the rows that it does not imply. Those that it does are
-  /// never among the numbers.
+  /// Numbers of the rows without |y − Y·x| <= share (dy + Σ dY_j |x_j|) for all points x, ascending; how many. Rows
+  /// that hold a NaN are among them. `found` has room for n. `open`, unless null, one for every kLanes rows: where it
+  /// is 0 they are not looked at, and it is set to 0 where the box implies all of them. `most`, unless null, is raised
+  /// to the largest Σ (|Y_j| + dY_j) half_j / (dy + Σ dY_j least_j) of the rows that it does not imply. Those that it
+  /// does are never among the numbers.
   std::size_t (*examine)(const Slabs& slabs, const Points& at, std::uint32_t* found, unsigned char* open, double* most);
 };
 

@@ -179,7 +179,8 @@ struct Loops {
     }
   }
 
-  /// A vector of rows: their columns are held where their number P is known and dY is zero; P = 0: any number, read anew.
+  /// A vector of rows: their columns are held where their number P is known and dY is zero; P = 0: any number, read
+  /// anew.
   template <int P, bool Full>
   struct Group {
     const Slabs& slabs;

@@ -8,7 +8,8 @@
 
 namespace wheelwright::bounds {
 
-/// work(std::integral_constant<std::size_t, Q>), Q = `size` from 2 to 12, else 0: the size is then known to `work` alone.
+/// work(std::integral_constant<std::size_t, Q>), Q = `size` from 2 to 12, else 0: the size is then known to `work`
+/// alone.
 template <typename Work>
 decltype(auto) with_known_size(std::size_t size, Work&& work) {
   switch (size) {

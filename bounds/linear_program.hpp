@@ -54,7 +54,8 @@ class LinearProgram {
   /// The rows, padded, for the loops of kernels.hpp.
   [[nodiscard]] kernels::Rows view() const;
 
-  /// The largest a·x − b of the rows from `first` on; −infinity where there are none. `x`: as many numbers as variables.
+  /// The largest a·x − b of the rows from `first` on; −infinity where there are none. `x`: as many numbers as
+  /// variables.
   [[nodiscard]] double violation(std::size_t first, const double* x) const;
 
   /// Solves max c·x, starting from the vertex of the last solve.
@@ -64,9 +65,9 @@ class LinearProgram {
   [[nodiscard]] LpSolution maximise(const Eigen::VectorXd& c, Basis& start);
 
   /// max c·x for a direction of norm one (`c`: as many numbers as variables), starting from the vertex of the last
-  /// solve or, where it is better, from one of the vertices that earlier calls ended in; the walk may end as soon as c·x
-  /// exceeds `enough`. Nothing where the program fails. Where no vertex is better than those, this costs some p² products;
-  /// nothing is allocated but in the first calls.
+  /// solve or, where it is better, from one of the vertices that earlier calls ended in; the walk may end as soon as
+  /// c·x exceeds `enough`. Nothing where the program fails. Where no vertex is better than those, this costs some p²
+  /// products; nothing is allocated but in the first calls.
   [[nodiscard]] std::optional<double> reach(const double* c, double enough);
   /// The vertex of the last solve, p numbers.
   [[nodiscard]] const double* vertex() const { return x_.data(); }

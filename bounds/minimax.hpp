@@ -41,9 +41,9 @@ struct MinimaxFit {
                                      const MinimaxOptions& options = {});
 
 /// The same for rows of one output in memory (γ* in units of `weights`, one number, or of 1), usually in one pass: the
-/// fit of an evenly spread sample comes first; then the rows in looks, each as long as all before it: those are put aside
-/// that can matter for any θ in a box around the fit of all before, and the last fit is that of all rows when it lies in
-/// every look's box (where it does not, that look is taken again with a wider one).
+/// fit of an evenly spread sample comes first; then the rows in looks, each as long as all before it: those are put
+/// aside that can matter for any θ in a box around the fit of all before, and the last fit is that of all rows when it
+/// lies in every look's box (where it does not, that look is taken again with a wider one).
 [[nodiscard]] MinimaxFit minimax_fit(const SlabColumns& rows, const Box& prior, const MinimaxOptions& options = {});
 
 }  // namespace wheelwright::bounds

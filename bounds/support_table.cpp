@@ -51,8 +51,8 @@ struct Sum {
   std::size_t edges = 0;
 };
 
-// From the vertex at `place` along edges to the best one for `direction`, at most `budget` of them. Q is the block's number
-// of parameters, or 0 where that is known to `graph` alone: then `room_a` and `room_mu` have room for it.
+// From the vertex at `place` along edges to the best one for `direction`, at most `budget` of them. Q is the block's
+// number of parameters, or 0 where that is known to `graph` alone: then `room_a` and `room_mu` have room for it.
 template <std::size_t Q>
 void follow(const VertexGraph& graph, const double* direction, std::uint32_t& place, std::size_t budget, double* room_a,
             double* room_mu, Sum& h) {

@@ -21,8 +21,8 @@ class SpreadSample {
   explicit SpreadSample(const SlabColumns& rows);
   /// Σ YᵀY / w² over the sample, w the half-width of a row over the prior box (p × p).
   [[nodiscard]] Eigen::MatrixXd information(const Box& prior) const;
-  /// Least squares on the sample with the same weights, drawn to the middle of the box by its half-widths; `information`
-  /// is information(prior).
+  /// Least squares on the sample with the same weights, drawn to the middle of the box by its half-widths;
+  /// `information` is information(prior).
   [[nodiscard]] Eigen::VectorXd estimate(const Box& prior, const Eigen::MatrixXd& information) const;
   /// Calls `take` with 1/16, 1/4 and then all of the sample; false as soon as `take` says so.
   bool each_level(const std::function<bool(const SlabColumns&)>& take) const;

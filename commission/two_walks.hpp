@@ -11,8 +11,8 @@
 
 namespace wheelwright::commission {
 
-/// core::both() of first(log) and second(a walk over the same rows): beside each other where `threads` > 1 and `log` can
-/// be walked twice at once, else second(log) after first(log).
+/// core::both() of first(log) and second(a walk over the same rows): beside each other where `threads` > 1 and `log`
+/// can be walked twice at once, else second(log) after first(log).
 template <typename First, typename Second>
 void two_walks(LogSource& log, std::size_t threads, const First& first, const Second& second) {
   const std::unique_ptr<LogSource> other = threads > 1 ? log.another_walk() : nullptr;

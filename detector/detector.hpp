@@ -95,8 +95,8 @@ class RowDetector {
 /// of `nominal` (s; 0: any), as logs are split.
 [[nodiscard]] bool follows(double before, double t, double nominal) noexcept;
 
-/// True if `t` and all values of `sample` are finite numbers. A sample that is not whole is taken for lost: filters and sums
-/// would never be rid of it.
+/// True if `t` and all values of `sample` are finite numbers. A sample that is not whole is taken for lost: filters and
+/// sums would never be rid of it.
 [[nodiscard]] bool is_whole(double t, std::span<const double> sample) noexcept;
 
 /// The detector of Dixon, Walker and Dawson (2001), section V, with the tight threshold: filter, threshold and decision
@@ -122,8 +122,8 @@ class Detector {
 
   /// Takes the sample at time `t` (s; as the filter's step) and decides. Allocates nothing. A gap of more than five
   /// nominal steps, or a time that does not increase, restarts the filter. The result is valid until the next call; it
-  /// is not valid (Decision::valid) where the filter has no row, nor for a sample that is not whole (is_whole()), which is
-  /// as good as lost.
+  /// is not valid (Decision::valid) where the filter has no row, nor for a sample that is not whole (is_whole()), which
+  /// is as good as lost.
   const Decision& step(double t, std::span<const double> sample) {
     if (!is_whole(t, sample)) {
       return rows_.nothing();

@@ -4,10 +4,10 @@
 ///
 /// While its steering stands still at a curvature κ = tan(δ)/L, the yaw rate is κv, and the driven axle has to move
 ///     τ = r (m + I κ²) v̇ + r (b + c κ²) v,
-/// with I the yaw inertia about the middle of the rear axle and c the scrub of the tyres in a turn. So rows of a model of
-/// one joint, filtered from stretch to stretch of constant steering, times [1, κ², 1, κ²], are rows in m, I, b and c: the
-/// regressor of a robot that the toolkit does not have, with the bounds of one that it has. What happens while the
-/// steering moves, I κ κ̇ v among it, is left out, and with it no fault is looked for there.
+/// with I the yaw inertia about the middle of the rear axle and c the scrub of the tyres in a turn. So rows of a model
+/// of one joint, filtered from stretch to stretch of constant steering, times [1, κ², 1, κ²], are rows in m, I, b and
+/// c: the regressor of a robot that the toolkit does not have, with the bounds of one that it has. What happens while
+/// the steering moves, I κ κ̇ v among it, is left out, and with it no fault is looked for there.
 ///
 /// The claims: truth inside the bounds, all of which are narrower than their prior; and a log whose steering never
 /// stands still for long says nothing rather than something wrong.

@@ -71,8 +71,8 @@ void judge_prior(const ModelClaims& claims, ModelCheck& result) {
   }
 }
 
-/// Driving to come is watched with no smaller errors than those that the set is proved with. An acceleration is asked of
-/// it only where it is stated: commissioning may know one of the log and none of other driving.
+/// Driving to come is watched with no smaller errors than those that the set is proved with. An acceleration is asked
+/// of it only where it is stated: commissioning may know one of the log and none of other driving.
 void judge_detector(const ModelClaims& claims, ModelCheck& result) {
   if (!claims.detector_errors) {
     return;

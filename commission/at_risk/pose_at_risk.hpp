@@ -31,8 +31,8 @@ struct PoseAtRiskOptions {
 /// The half-spaces of which the set at a risk is the intersection, as rows |y − Yϑ| <= dy over the box of the
 /// `guaranteed` model: first its facets, whose other side is that box, then the sums over scales of 1 s and more at all
 /// looks after the learning, in the order of time, as far as they cut the box; RegressionBlock::sample numbers them,
-/// facets first. Of `risk` the risk of all looks together, which is spread over the time driven in `log`, errors, scales and
-/// delay are used; V0 is learnt of the share `learning` of the log. Walks it four times.
+/// facets first. Of `risk` the risk of all looks together, which is spread over the time driven in `log`, errors,
+/// scales and delay are used; V0 is learnt of the share `learning` of the log. Walks it four times.
 [[nodiscard]] RegressionBlock pose_sum_rows(LogSource& log, const detector::KinematicModel& guaranteed,
                                             const detector::PoseRiskModel& risk, double learning);
 

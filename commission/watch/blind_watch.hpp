@@ -29,8 +29,8 @@ class BlindWatch {
   /// start. Throws InvalidArgument unless both are finite and >= 0.
   BlindWatch(double step, double settling);
 
-  /// Whether the clock hardly went on (hardly_goes_on()) from the last row to one at time `t` (s), whose decision is to be
-  /// told as undecided().
+  /// Whether the clock hardly went on (hardly_goes_on()) from the last row to one at time `t` (s), whose decision is to
+  /// be told as undecided().
   [[nodiscard]] bool crawls(double t) const;
 
   /// A row with a decision at time `t` (s). Returns the spell that it ends, where that had been told.

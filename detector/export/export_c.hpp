@@ -38,8 +38,8 @@ struct CExportOptions {
 [[nodiscard]] std::string c_header(const TorqueDetector& detector, const detector::ScaleDetector& sums,
                                    const CExportOptions& options = {});
 
-/// The detector of `model` as `options` ask for it, with the one at a stated risk where the model says something at one,
-/// for an expected number of `false_alarms` in a second there. Throws as c_header() and make_detector() do.
+/// The detector of `model` as `options` ask for it, with the one at a stated risk where the model says something at
+/// one, for an expected number of `false_alarms` in a second there. Throws as c_header() and make_detector() do.
 [[nodiscard]] std::string c_header(const OnlineModel& model, const detector::DetectorOptions& detector,
                                    double false_alarms, const CExportOptions& options = {});
 

@@ -193,8 +193,8 @@ class PoseSumDetector {
   std::vector<double> direction_;
 };
 
-/// Walks the rows of `log` whose time is wanted(t) through `detector`, which forgets all samples where a segment begins;
-/// calls taken(whether sums were looked at) after each.
+/// Walks the rows of `log` whose time is wanted(t) through `detector`, which forgets all samples where a segment
+/// begins; calls taken(whether sums were looked at) after each.
 template <typename Wanted, typename Taken>
 void walk_pose_samples(LogSource& log, PoseSumDetector& detector, const Wanted& wanted, const Taken& taken) {
   const std::vector<std::size_t> pick = core::positions_of(log, detector.measurement().columns());

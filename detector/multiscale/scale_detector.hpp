@@ -95,8 +95,8 @@ class ScaleDetector {
 
   /// Forgets all samples.
   void restart();
-  /// Takes a sample (RegressorFilter::step). Returns whether a sum was looked at; looks() are those then. A sample that is
-  /// not whole (detector.hpp) is as good as lost.
+  /// Takes a sample (RegressorFilter::step). Returns whether a sum was looked at; looks() are those then. A sample that
+  /// is not whole (detector.hpp) is as good as lost.
   bool step(double t, std::span<const double> sample);
   /// The sums that were looked at with the last sample.
   [[nodiscard]] std::span<const SumState> looks() const { return {looks_.data(), looked_}; }

@@ -28,9 +28,9 @@ using Json = nlohmann::ordered_json;
 /// Writes json_text(value) and a line end to `path`, whole or not at all. Throws InputError as AtomicFile does.
 void write_json(const std::filesystem::path& path, const Json& value);
 
-/// Reads `text`; `file` is for messages. Throws InputError, naming file, line and column, when it is no JSON, and, naming
-/// file and key, for a key that stands twice in an object, more than 2'000'000 values, 10'000 members of one object or
-/// 200 levels.
+/// Reads `text`; `file` is for messages. Throws InputError, naming file, line and column, when it is no JSON, and,
+/// naming file and key, for a key that stands twice in an object, more than 2'000'000 values, 10'000 members of one
+/// object or 200 levels.
 [[nodiscard]] Json parse_json(std::string_view text, const std::string& file);
 
 /// Whether `text` begins as a JSON object does, behind white space or a byte order mark.

@@ -428,8 +428,8 @@ class Chooser {
                              own.name, joints.size(), word, core::listed(joints), side, own.name, joints.front()));
   }
 
-  /// Beside wheels, right and left joints of another topic that are named neither wheel, motor nor drive are an arm's or
-  /// a gripper's.
+  /// Beside wheels, right and left joints of another topic that are named neither wheel, motor nor drive are an arm's
+  /// or a gripper's.
   void leave_other_joints() {
     const bool wheels = std::ranges::any_of(offers_, [](const Offer& offer) {
       return !offer.other_joints && (offer.column.name.ends_with("_r") || offer.column.name.ends_with("_l"));

@@ -30,8 +30,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Bytes of a file that are stored; `enough` where they are as many, where the file system does not tell, and where they
-/// lie in so many pieces that somebody wrote them.
+/// Bytes of a file that are stored; `enough` where they are as many, where the file system does not tell, and where
+/// they lie in so many pieces that somebody wrote them.
 off_t stored_bytes(int file, off_t enough) {
   constexpr int most_pieces = 100'000;
   off_t stored = 0, at = 0;

@@ -47,8 +47,8 @@ struct BagPlan {
   BagClocks clocks;                              ///< of each source
 };
 
-/// Rotation about the vertical of a quaternion (x, y, z, w) that turns forward to where it points, rad; NaN of one that is
-/// none, as of a message whose orientation nobody set.
+/// Rotation about the vertical of a quaternion (x, y, z, w) that turns forward to where it points, rad; NaN of one that
+/// is none, as of a message whose orientation nobody set.
 double yaw_of(const double* q) {
   if (q[0] == 0.0 && q[1] == 0.0 && q[2] == 0.0 && q[3] == 0.0) {
     return std::numeric_limits<double>::quiet_NaN();

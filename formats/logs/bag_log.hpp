@@ -92,8 +92,8 @@ struct BagTopicView {
   std::vector<std::string> filled;  ///< arrays beside `names` that had numbers in one of these messages
   /// "effort[left]" and the like that had one; where this is empty any element of a filled array counts as having one
   std::vector<std::string> elements = {};
-  /// What the first message says is not measured: "angular_velocity", "linear_acceleration" of an Imu, "orientation" of a
-  /// pose.
+  /// What the first message says is not measured: "angular_velocity", "linear_acceleration" of an Imu, "orientation" of
+  /// a pose.
   std::vector<std::string> unmeasured = {};
   std::string unreadable = {};  ///< why none of the first messages could be read; empty where one could
 };

@@ -299,11 +299,11 @@ class MergedCsvWalk final : public RowWalk {
 };
 
 /// Finds rows that begin with an index which the header does not name (pandas with index_label=False, R's write.table)
-/// and whose last column is empty: they have as many separators as rows that merely end with one, and would be read with
-/// all columns shifted by one. They differ by this, in every row: the first field counts up by one; the field behind
-/// that of the time rises, as the time under the index does; and the time as it would be read is either that count, or
-/// does not rise. A table whose rows alone end with a separator is taken for one only where its time counts up by one
-/// and its second column never falls; the message says how such a one is written.
+/// and whose last column is empty: they have as many separators as rows that merely end with one, and would be read
+/// with all columns shifted by one. They differ by this, in every row: the first field counts up by one; the field
+/// behind that of the time rises, as the time under the index does; and the time as it would be read is either that
+/// count, or does not rise. A table whose rows alone end with a separator is taken for one only where its time counts
+/// up by one and its second column never falls; the message says how such a one is written.
 class UnnamedIndex {
  public:
   explicit UnnamedIndex(const CsvHeader& header)

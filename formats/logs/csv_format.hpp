@@ -34,8 +34,8 @@ struct CsvOptions {
   std::size_t min_rows = 20;      ///< usable rows that a log must have
   /// Whether a file may reach for others, and unpack without limit. Otherwise a log reads itself, the files of its
   /// directory that its metadata name, and the journal beside it: no path out of the directory, no link that leads out
-  /// of it, no HDF5 dataset whose values stand in another file, no copy of a journal of more than 4 GiB or of a database
-  /// of more than 16 GiB, no file that consists of holes, and what is packed may have no more than
+  /// of it, no HDF5 dataset whose values stand in another file, no copy of a journal of more than 4 GiB or of a
+  /// database of more than 16 GiB, no file that consists of holes, and what is packed may have no more than
   /// files::most_unpacked() bytes.
   bool trust = false;
 };

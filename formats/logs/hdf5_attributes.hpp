@@ -40,9 +40,9 @@ struct DatasetAttributes {
 [[nodiscard]] std::string format_defect(hid_t type);
 
 /// What the attributes of a dataset say of its `values`. Nothing where they are damaged: the library must not be asked
-/// about them again, since it then reads what it has freed. Nor may it go through damaged ones, since it then gives back
-/// what it does not have: looking for a name that none can have meets the damage first, and in the library's own order it
-/// makes no table of those that stand outside of the header.
+/// about them again, since it then reads what it has freed. Nor may it go through damaged ones, since it then gives
+/// back what it does not have: looking for a name that none can have meets the damage first, and in the library's own
+/// order it makes no table of those that stand outside of the header.
 [[nodiscard]] std::optional<DatasetAttributes> attributes_of(hid_t dataset, hid_t values);
 
 }  // namespace wheelwright::logs::hdf5

@@ -96,8 +96,8 @@ std::uint64_t size_of(hid_t file) {
   return H5Fget_filesize(file, &size) < 0 ? 0 : size;
 }
 
-/// Why values packed by a shuffle are not read: bytes come back in order where it knows the size of an element, which the
-/// library always gives it, and the library asks nobody whether the file has another.
+/// Why values packed by a shuffle are not read: bytes come back in order where it knows the size of an element, which
+/// the library always gives it, and the library asks nobody whether the file has another.
 std::string shuffle_defect(hid_t how, std::size_t width) {
   std::array<unsigned, 1> parameter{};
   std::size_t parameters = parameter.size();
@@ -198,8 +198,8 @@ std::string either(std::string first, std::string second) {
   return first.empty() ? std::move(second) : std::move(first);
 }
 
-/// How the values of a dataset stand. Where they are in no line that could be a column, `unlike` and `remedy` of `source`
-/// say so.
+/// How the values of a dataset stand. Where they are in no line that could be a column, `unlike` and `remedy` of
+/// `source` say so.
 void find_line(hid_t space, Source& source) {
   const int dimensions = H5Sget_simple_extent_ndims(space);
   ValueLine::Place sides{0, 1};
@@ -215,7 +215,8 @@ void find_line(hid_t space, Source& source) {
   }
 }
 
-/// Lists a member that is no number, where it is like a column, and what is like one inside of it: nothing of it is read.
+/// Lists a member that is no number, where it is like a column, and what is like one inside of it: nothing of it is
+/// read.
 void list_unlike_member(const Source& whole, const std::string& name, hid_t type, std::vector<Source>& sources) {
   const H5T_class_t kind = H5Tget_class(type);
   const auto put = [&](const std::string& path, const std::string& member, const std::string& unlike) {

@@ -44,8 +44,8 @@ struct FastBandOptions {
 /// torque is missing first and then an impact. Below the band nothing of it is left. Rows just after a joint's speed
 /// has changed its sign, where friction acts, do not count. A torque reverses while it changes fast, when whatever is
 /// wrong with its delay or its limits shows too: it must also stand out against moments at which it changes as fast,
-/// and outweigh what something else leaves at these. Nothing for a preparation without a healthy log, without efforts or
-/// with too few rows.
+/// and outweigh what something else leaves at these. Nothing for a preparation without a healthy log, without efforts
+/// or with too few rows.
 [[nodiscard]] std::optional<FastBand> look_at_fast_band(const PreparedGap& prepared,
                                                         const std::vector<FittedEffect>& causes,
                                                         const FastBandOptions& options = {});

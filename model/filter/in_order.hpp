@@ -22,8 +22,8 @@ void each(Eigen::Index n, Act&& act) {
   }
 }
 
-/// result = matrix · x, with `part` of each of the matrix's numbers, each sum from the first column to the last. The matrix
-/// has a column or more, x and the result have its sizes (unchecked).
+/// result = matrix · x, with `part` of each of the matrix's numbers, each sum from the first column to the last. The
+/// matrix has a column or more, x and the result have its sizes (unchecked).
 template <typename Part = std::identity>
 void multiply(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result, const Part& part = {}) {
   const Eigen::Index rows = matrix.rows(), columns = matrix.cols();

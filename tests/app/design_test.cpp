@@ -121,8 +121,8 @@ TEST_F(Design, TellsBothPromises) {
   EXPECT_THAT(refused.err, AllOf(HasSubstr("--guarantee"), HasSubstr("bias")));
 }
 
-// The commands of speed and yaw rate, integrated here by themselves, end where the wheels' commands say; the recording has
-// the same numbers, and a robot whose lever arm is the whole track is not turned twice as fast.
+// The commands of speed and yaw rate, integrated here by themselves, end where the wheels' commands say; the recording
+// has the same numbers, and a robot whose lever arm is the whole track is not turned twice as fast.
 TEST_F(Design, ItsControllerIsGivenTheSameDrive) {
   put("whole.yaml", bytes(path("robot.yaml")) + "lever_arm: track\n");
   for (const std::string robot : {"robot", "whole"}) {

@@ -280,7 +280,8 @@ TEST_F(Metamorphic, ALogMayStandInSeveralFiles) {
   EXPECT_TRUE(holds);
 }
 
-// Units of columns are the user's: a log in halves of a radian, and the factor told, is the log in radians to the last bit.
+// Units of columns are the user's: a log in halves of a radian, and the factor told, is the log in radians to the last
+// bit.
 TEST_F(Metamorphic, UnitsOfColumnsMayBeTold) {
   const bool holds = rc::check("columns in other units, with --map", [this] {
     const Drive drive = drawn();

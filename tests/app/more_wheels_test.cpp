@@ -66,8 +66,8 @@ TEST_F(SkidSteer, EffectiveTrackAndSlipAreParametersWithBounds) {
   EXPECT_EQ(seen, 4U);
 }
 
-// A healthy log that turns by another track than the robot file's was a payload to `gap`, of itself too: columns of the slip
-// were those of a yaw inertia that its own fit had corrected.
+// A healthy log that turns by another track than the robot file's was a payload to `gap`, of itself too: columns of the
+// slip were those of a yaw inertia that its own fit had corrected.
 TEST_F(SkidSteer, AHealthyRobotIsNotSaidToHaveChanged) {
   drive("healthy", 5);
   drive("again", 6);
@@ -79,8 +79,8 @@ TEST_F(SkidSteer, AHealthyRobotIsNotSaidToHaveChanged) {
   EXPECT_EQ(gap("again", "measured").at("verdict"), "no_gap");
 }
 
-// A drive at constant speed hardly excites the mass: fitted again it is worse than known, and what that left, held out, was a
-// gap without a cause in 13 of 13 such drives.
+// A drive at constant speed hardly excites the mass: fitted again it is worse than known, and what that left, held out,
+// was a gap without a cause in 13 of 13 such drives.
 TEST_F(SkidSteer, ADriveThatExcitesLittleIsNoGap) {
   drive("healthy", 5);
   std::string eight = bytes(path("healthy.yaml"));

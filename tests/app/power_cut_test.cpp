@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a power cut leaves is what was there or what is new, either whole: the bytes of a file are on disk before it gets
-// its name, and the name is on disk before the command ends.
+// What a power cut leaves is what was there or what is new, either whole: the bytes of a file are on disk before it
+// gets its name, and the name is on disk before the command ends.
 #include <algorithm>
 #include <map>
 #include <set>
@@ -135,8 +135,8 @@ TEST_F(PowerCut, ARunThatEndsAtAnyCallLeavesTheOldFileOrTheNewOne) {
   }
 }
 
-// A run that was killed, interrupted or failed between the renames of its files left some of them without the result, and
-// the next was refused for them: "not written by `wheelwright gap`".
+// A run that was killed, interrupted or failed between the renames of its files left some of them without the result,
+// and the next was refused for them: "not written by `wheelwright gap`".
 TEST_F(PowerCut, AResultIsPutInItsPlaceTogether) {
   put("drive.yaml", kDrive);
   ASSERT_EQ(run("simulate drive.yaml --out log.csv").code, 0);

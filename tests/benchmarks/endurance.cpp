@@ -4,10 +4,10 @@
 /// then, and how long does its slowest step take?
 ///
 /// Plays a recording over and over, as fast as it goes, with the clock running on, through the detector of the torque
-/// residual, the one at a stated risk where the model has it, and the exported C (where there is a compiler). Once an hour
-/// of the clock comes trouble: a spell of values that are no numbers, lost rows, a gap, a clock that jumps back, one that
-/// stands, values too small to be normal. After each, and after each beginning of the recording, the decisions must be those
-/// of the first time, residuals to 1e-6 of the threshold (the clock's digits differ).
+/// residual, the one at a stated risk where the model has it, and the exported C (where there is a compiler). Once an
+/// hour of the clock comes trouble: a spell of values that are no numbers, lost rows, a gap, a clock that jumps back,
+/// one that stands, values too small to be normal. After each, and after each beginning of the recording, the decisions
+/// must be those of the first time, residuals to 1e-6 of the threshold (the clock's digits differ).
 ///
 ///     wheelwright-endurance MODEL.json LOG.csv [HOURS]      prints what it found; ends with 1 where something differs
 ///     wheelwright-endurance MODEL.json LOG.csv HOURS --emit the same rows as CSV, for `wheelwright detect --follow`
@@ -153,8 +153,8 @@ class Exported {
   int (*step_)(double, const double*, double*);
 };
 
-/// Rows of the recording with the clock running on, and the troubles of each hour. `each` gets the time, the sample, and
-/// the row's number where what is said of it can be compared.
+/// Rows of the recording with the clock running on, and the troubles of each hour. `each` gets the time, the sample,
+/// and the row's number where what is said of it can be compared.
 class Player {
  public:
   Player(const LogTable& log, const std::vector<std::string>& columns) : log_(log), inputs_(columns.size()) {

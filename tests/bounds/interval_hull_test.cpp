@@ -125,7 +125,8 @@ TEST(IntervalHull, TakesMorePassesWhereThereIsLittleRoom) {
   }
 }
 
-// Rows that look settled by what came early: a corner that each portion moves, and a row beyond it at the very beginning.
+// Rows that look settled by what came early: a corner that each portion moves, and a row beyond it at the very
+// beginning.
 TEST(IntervalHull, RowsOfTheBeginningAreHeldAgainstTheCornersOfTheEnd) {
   for (const bool noisy : {false, true}) {
     for (const std::uint64_t seed : {1, 2, 3}) {

@@ -139,7 +139,8 @@ TEST_F(LogHealthTest, MissingSamplesAreCountedAndPlaced) {
   EXPECT_LE(found.when.back().upper, 20.0);
 }
 
-// Starts of segments that are no rows, or stand there twice, were looked up in front of the first row and behind the last.
+// Starts of segments that are no rows, or stand there twice, were looked up in front of the first row and behind the
+// last.
 TEST_F(LogHealthTest, SegmentsOfATableBeginAtItsRows) {
   const std::size_t rows = log.rows();
   for (const std::vector<std::size_t>& starts :

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Loaded into a program by LD_PRELOAD: appends what it brings to disk, what it renames, and that it listens on the network
-// to the file that RECORDED_CALLS names, a line for each that was done,
+// Loaded into a program by LD_PRELOAD: appends what it brings to disk, what it renames, and that it listens on the
+// network to the file that RECORDED_CALLS names, a line for each that was done,
 //
 //     sync	PATH	BYTES
 //     move	FROM	TO	BYTES

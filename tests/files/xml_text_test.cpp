@@ -31,7 +31,8 @@ TEST(XmlText, CharactersByNumberAreReadWhereTheyAreAscii) {
   EXPECT_EQ(xml.attribute(0, "b"), "M&#9999;\"");
 }
 
-// Found by the fuzzer of simulator files: the parser takes a vertical tab for white space, and the joint had no name here.
+// Found by the fuzzer of simulator files: the parser takes a vertical tab for white space, and the joint had no name
+// here.
 TEST(XmlText, WhiteSpaceIsWhatTheParserTakesForIt) {
   const XmlText xml = XmlText::parse("<a\vb\f=\v'1'\fc='2'/>", "a.xml");
   EXPECT_EQ(xml.attribute(0, "b"), "1");

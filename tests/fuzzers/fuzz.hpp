@@ -77,7 +77,8 @@ struct FileOfProcess {
   }
 };
 
-/// Puts `bytes` into a file of this process with that ending, and returns its path. It is removed when the process ends.
+/// Puts `bytes` into a file of this process with that ending, and returns its path. It is removed when the process
+/// ends.
 inline std::filesystem::path on_disk(std::string_view bytes, const std::string& ending) {
   const auto path =
       std::filesystem::temp_directory_path() / ("wheelwright-fuzz-" + std::to_string(::getpid()) + ending);

@@ -58,7 +58,8 @@ class Datasets {
   void group(const std::string& name) {
     H5Gclose(H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
   }
-  /// `values` in a dataset of these sides (one, of all values, where there are none), in chunks where `piece` has sides.
+  /// `values` in a dataset of these sides (one, of all values, where there are none), in chunks where `piece` has
+  /// sides.
   void put(const std::string& name, const std::vector<double>& values, hid_t type = H5T_IEEE_F64LE,
            std::vector<hsize_t> sides = {}, const std::vector<hsize_t>& piece = {}) {
     if (sides.empty()) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Recordings as other programs make them, each of which was once read with wrong values or fewer rows and without a word.
+// Recordings as other programs make them, each of which was once read with wrong values or fewer rows and without a
+// word.
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -169,8 +170,8 @@ TEST_F(RecordingsOfOthers, AClockThatIsSetBackByLittleBeginsASegment) {
   }
 }
 
-// A slow publisher whose clock is ahead, and a fast one: their messages are in the order of their stamps, in one segment
-// but for what the first run of late ones looks like.
+// A slow publisher whose clock is ahead, and a fast one: their messages are in the order of their stamps, in one
+// segment but for what the first run of late ones looks like.
 TEST_F(RecordingsOfOthers, TwoClocksOfATopicAreNoClockThatIsSetBackAgainAndAgain) {
   BagWriter bag(path("a.mcap"));
   const std::size_t topic = add(bag, "/joint_states", RosJointState::type);

@@ -394,7 +394,8 @@ TEST(Urdf, ARotorThatLeavesNoWheelIsSaid) {
   EXPECT_THAT(out.not_expressed[0].why, AllOf(HasSubstr("right_wheel"), HasSubstr("would be no body's inertia")));
 }
 
-// base_footprint, which most robots of ROS have, is a frame; a link with a shape has a mass that the file does not tell.
+// base_footprint, which most robots of ROS have, is a frame; a link with a shape has a mass that the file does not
+// tell.
 TEST(Urdf, AnotherMassThanTheRobotFilesIsSaid) {
   const testing::SampleRobot sample;
   const std::string with_frame = sample_of(SimulatorFormat::urdf), frame = "<link name=\"base_footprint\"/>\n";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The node of examples/ros2, compiled against the headers in stubs/, not against ROS. Oracle of the alarms: the detector
-/// over the same log, as `wheelwright detect` runs it.
+/// The node of examples/ros2, compiled against the headers in stubs/, not against ROS. Oracle of the alarms: the
+/// detector over the same log, as `wheelwright detect` runs it.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

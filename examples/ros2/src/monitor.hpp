@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The torque residual of a robot on two sides of wheels, watched message by message. Plain C++ on the library; node.hpp
-/// connects it to ROS 2.
+/// The torque residual of a robot on two sides of wheels, watched message by message. Plain C++ on the library;
+/// node.hpp connects it to ROS 2.
 #pragma once
 
 #include <cstddef>
@@ -60,8 +60,8 @@ struct Status {
 class Monitor {
  public:
   /// Throws InvalidArgument, naming what was expected, unless `model` drives on a right and a left wheel without a
-  /// measured heading, each side has a joint, no joint is named twice, and the options are finite and in range. `now` (s)
-  /// is the time of a clock that only grows, as for the other members.
+  /// measured heading, each side has a joint, no joint is named twice, and the options are finite and in range. `now`
+  /// (s) is the time of a clock that only grows, as for the other members.
   Monitor(const wheelwright::OnlineModel& model, const Sides& sides, double now, MonitorOptions options = {});
 
   /// Takes a message that comes at time `now`. Returns whether an instant was decided on. A message that names no joint
