@@ -243,12 +243,12 @@ void settle(PreparedGap& prepared, const std::vector<std::size_t>& found, const 
 
 // What to write into the robot file, so that a large slip in turns is not left to effects of first order; else empty.
 std::string track_hint(const FittedEffect& effect, const Drive& drive) {
-  if (effect.effect.name != "turning_slip" || !effect.effect.physical) {
+  if (!effect.effect.physical) {
     return "";
   }
   const std::vector<double> coefficients(effect.coefficients.begin(), effect.coefficients.end());
   for (const PhysicalValue& value : effect.effect.physical(coefficients, effect.shape)) {
-    if (value.name == "track_in_effect" && value.value > 1.02) {
+    if (value.name == kTrackInEffect && value.value > 1.02) {
       return fmt::format(
           "; it turns as a track of {0:.3g} m would have it: with `track_width: {0:.3g}` in the robot file, what else "
           "there is shows more sharply",

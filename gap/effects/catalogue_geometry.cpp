@@ -312,7 +312,8 @@ Effect turning_slip() {
           },
       .physical =
           [](std::span<const double> c, Shape) {
-            return std::vector<PhysicalValue>{{"slip", "1", c[0]}, {"track_in_effect", "1", 1.0 / (1.0 - c[0])}};
+            return std::vector<PhysicalValue>{{"slip", "1", c[0]},
+                                              {std::string(kTrackInEffect), "1", 1.0 / (1.0 - c[0])}};
           }};
 }
 

@@ -39,6 +39,10 @@ struct ShapeParameter {
   std::function<double(const Drive&)> scale{};  ///< of this drive, > 0, e.g. a typical speed; empty: 1
 };
 
+/// Name of the physical value by which an effect says that the robot turns as one of another track: that track over the
+/// robot file's, in 1.
+inline constexpr std::string_view kTrackInEffect = "track_in_effect";
+
 /// A physical quantity that an effect's coefficients and shapes stand for.
 struct PhysicalValue {
   std::string name{};
