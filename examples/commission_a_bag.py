@@ -4,9 +4,9 @@
 #
 #     python3 commission_a_bag.py [LOG [ROBOT.yaml [ANOTHER_LOG]]] [--out PICTURE.png]
 #
-# LOG is a rosbag2 recording (a directory, .mcap or .db3), HDF5 or CSV. Without arguments: the log and robot that ship with
-# the project, and a simulated drive on which a tyre loses radius half-way. The cells (# %%) run one by one in editors
-# that know them.
+# LOG is a rosbag2 recording (a directory, .mcap or .db3), HDF5 or CSV. Without arguments: the log and robot that ship
+# with the project, and a simulated drive on which a tyre loses radius half-way. The cells (# %%) run one by one in
+# editors that know them.
 
 # %%
 import argparse

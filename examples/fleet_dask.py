@@ -4,12 +4,12 @@
 #
 #     python3 fleet_dask.py [LIST.csv ROBOT.yaml] [--scheduler ADDRESS] [--out TABLE.csv]
 #
-# LIST.csv has the header robot,log (paths relative to the list). Without arguments: six simulated robots, one of whose logs
-# is broken. ADDRESS is that of a running Dask scheduler, whose workers see the files and have the module wheelwright;
-# without it the work is done in processes of this machine.
+# LIST.csv has the header robot,log (paths relative to the list). Without arguments: six simulated robots, one of whose
+# logs is broken. ADDRESS is that of a running Dask scheduler, whose workers see the files and have the module
+# wheelwright; without it the work is done in processes of this machine.
 #
-# `wheelwright fleet` examines fleets without any of this (threads, MPI, Slurm), goes on where it was killed, and judges who
-# stands outside or drifts. This is for those whose data and machines are in Dask already.
+# `wheelwright fleet` examines fleets without any of this (threads, MPI, Slurm), goes on where it was killed, and judges
+# who stands outside or drifts. This is for those whose data and machines are in Dask already.
 
 # %%
 import argparse
@@ -26,7 +26,8 @@ try:
     import dask
     import dask.bag
 except ModuleNotFoundError:
-    print("This example works with Dask, which is not installed (Debian: apt install python3-dask python3-distributed).")
+    print("This example works with Dask, which is not installed "
+          "(Debian: apt install python3-dask python3-distributed).")
     sys.exit(77)
 
 HERE = Path(__file__).resolve().parent
@@ -34,8 +35,8 @@ COLUMNS = ["robot", "status", "parameter", "unit", "estimate", "lower", "upper",
 
 
 # %% [markdown]
-# One robot. What a log throws becomes a row of the table: one bad log never stops the rest. Results are plain numbers and
-# text, which is what travels between workers.
+# One robot. What a log throws becomes a row of the table: one bad log never stops the rest. Results are plain numbers
+# and text, which is what travels between workers.
 # %%
 def commission_one(robot: str, log: str, robot_file: str) -> list[dict[str, Any]]:
     nothing = dict.fromkeys(COLUMNS[2:-1])
@@ -93,8 +94,8 @@ def simulate_fleet(directory: Path) -> tuple[Path, Path]:
 
 
 # %% [markdown]
-# A partition for each robot: Dask hands them out to whichever worker is free, in processes, so that a worker that dies takes
-# one robot along, which a scheduler's workers do again.
+# A partition for each robot: Dask hands them out to whichever worker is free, in processes, so that a worker that dies
+# takes one robot along, which a scheduler's workers do again.
 # %%
 def commission_all(fleet: list[dict[str, str]], directory: Path, robot_file: Path) -> list[dict[str, Any]]:
     robots = dask.bag.from_sequence(
@@ -118,7 +119,8 @@ def tell_spread(table: list[dict[str, Any]]) -> None:
         spread = 1.4826 * np.median(np.abs(estimates - median))  # of a normal population: its standard deviation
         widths = np.median([row["upper"] - row["lower"] for row in rows])
         print(
-            f"  {name:14} {len(rows):4} robots: median {median:9.4g}, spread {spread:9.3g}, from {estimates.min():9.4g} to "
+            f"  {name:14} {len(rows):4} robots: median {median:9.4g}, spread {spread:9.3g}, "
+            f"from {estimates.min():9.4g} to "
             f"{estimates.max():9.4g} {rows[0]['unit']}; one robot's bounds are {widths:.3g} wide"
         )
 

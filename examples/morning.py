@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # %% [markdown]
-# A morning with a robot: is the log fit, what is the robot, is the model proved, what would it see, what does it see, why is
-# the robot no longer itself, which drive would tell more, and the detector for its controller.
+# A morning with a robot: is the log fit, what is the robot, is the model proved, what would it see, what does it see,
+# why is the robot no longer itself, which drive would tell more, and the detector for its controller.
 #
 #     python3 morning.py PICTURES [LOG [ROBOT.yaml [TODAY]]]
 #
@@ -91,7 +91,8 @@ for i in range(len(run.outputs)):
 keep("detection")
 
 # %% [markdown]
-# And a third one, which the robot seems to go slowly: what does the model lack? Without logs it is simulated with dry friction.
+# And a third one, which the robot seems to go slowly: what does the model lack? Without logs it is simulated with dry
+# friction.
 # %%
 truth = {"mass": 21.0, "yaw_inertia": 0.9, "viscous_linear": 4.0, "viscous_yaw": 0.5}
 slow = today if arguments.today is not None else ww.simulate({
@@ -110,7 +111,8 @@ keep("gap")
 # %%
 plan = ww.design(model, "bounds", speed=8.0, acceleration=20.0, radius=1.5, duration=8.0, stages=2)
 print(plan.summary)
-suspects = ww.design(model, "discrimination", between=["coulomb", "caster_drag"], speed=8.0, acceleration=20.0, radius=1.5,
+suspects = ww.design(model, "discrimination", between=["coulomb", "caster_drag"], speed=8.0, acceleration=20.0,
+                     radius=1.5,
                      duration=8.0, stages=2)
 print(suspects.summary)
 

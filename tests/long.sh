@@ -11,7 +11,8 @@
 #   tests/long.sh coverage    lines that the tests run, by room, and those they do not (tools/coverage.py)
 #   tests/long.sh alone       every source file by itself, by clang (tools/check_alone.py, ten minutes)
 #   tests/long.sh tidy        clang-tidy (tools/check_tidy.py, half an hour)
-#   tests/long.sh sanitizers  all test programs once more under AddressSanitizer and UndefinedBehaviorSanitizer, but for these
+#   tests/long.sh sanitizers  all test programs once more under AddressSanitizer and UndefinedBehaviorSanitizer, but for
+#                             these
 set -eu
 cd "$(dirname "$0")/.."
 jobs=$(nproc 2>/dev/null || echo 2)
@@ -85,7 +86,8 @@ for part in ${*:-slow campaign sanitizers}; do
       ;;
     [0-9]*) ;;
     *)
-      echo "usage: tests/long.sh [slow] [campaign] [endurance] [faults] [coverage] [alone] [tidy] [sanitizers] | fuzz [SECONDS] | mutations [COUNT]" >&2
+      echo "usage: tests/long.sh [slow] [campaign] [endurance] [faults] [coverage] [alone] [tidy] [sanitizers]" \
+        "| fuzz [SECONDS] | mutations [COUNT]" >&2
       exit 2
       ;;
   esac

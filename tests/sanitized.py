@@ -4,9 +4,9 @@
 
     tests/sanitized.py [JOBS]
 
-A test program makes what its tests share once, which takes most of their time under sanitizers; CTest starts it anew for
-every test. Programs are split in as many shards as there are processors. Their output is kept in build-asan/sanitized/.
-Ends with 0 when all tests that CTest lists were run and none failed.
+A test program makes what its tests share once, which takes most of their time under sanitizers; CTest starts it anew
+for every test. Programs are split in as many shards as there are processors. Their output is kept in
+build-asan/sanitized/. Ends with 0 when all tests that CTest lists were run and none failed.
 """
 
 import json
@@ -54,7 +54,8 @@ def run(program, shard, shards, environment):
     began = time.monotonic()
     with log.open("w") as out:
         code = subprocess.run([program], cwd=BUILD / "tests", stdout=out, stderr=subprocess.STDOUT,
-                              env=environment | {"GTEST_TOTAL_SHARDS": str(shards), "GTEST_SHARD_INDEX": str(shard)}).returncode
+                              env=environment
+                              | {"GTEST_TOTAL_SHARDS": str(shards), "GTEST_SHARD_INDEX": str(shard)}).returncode
     text = log.read_text(errors="replace")
     passed = len(re.findall(r"^\[       OK \]", text, re.MULTILINE))
     skipped = len(re.findall(r"^\[  SKIPPED \] .*\)$", text, re.MULTILINE))
@@ -73,15 +74,18 @@ def main():
     environment["GTEST_FILTER"] = gtest_filter(settings["filter"]["exclude"]["name"])
     programs, others = listed()
     (BUILD / "sanitized").mkdir(exist_ok=True)
-    shards = [(program, shard) for program in sorted(programs, key=lambda p: -len(programs[p])) for shard in range(jobs)]
+    shards = [(program, shard) for program in sorted(programs, key=lambda p: -len(programs[p]))
+              for shard in range(jobs)]
     with ThreadPoolExecutor(jobs) as pool:
         results = list(pool.map(lambda part: run(*part, jobs, environment), shards))
     passed, skipped, codes = map(list, zip(*results))
     wanted = sum(map(len, programs.values()))
-    print(f"{sum(passed)} of {wanted} tests of {len(programs)} programs passed under sanitizers, {sum(skipped)} were skipped",
+    print(f"{sum(passed)} of {wanted} tests of {len(programs)} programs passed under sanitizers, "
+          f"{sum(skipped)} were skipped",
           flush=True)
     rest = "^(" + "|".join(map(re.escape, others)) + ")$"
-    code = subprocess.run(["ctest", "--preset", PRESET, "-j", str(jobs), "-R", rest], cwd=ROOT).returncode if others else 0
+    call = ["ctest", "--preset", PRESET, "-j", str(jobs), "-R", rest]
+    code = subprocess.run(call, cwd=ROOT).returncode if others else 0
     return 1 if code or any(codes) or sum(passed) + sum(skipped) != wanted else 0
 
 

@@ -5,8 +5,8 @@
     check_alone.py [FOLDER...]    folders of this repository (bounds, app, tests/logs, ...); without one all of them
 
 The commands are those of the preset `debug`, which is configured first; headers that are made are those of
-build/. Nothing is built. Warnings are errors, as in every build. Exit code 1 where a file does not compile, with the first messages of
-each. All of them take two processors ten minutes.
+build/. Nothing is built. Warnings are errors, as in every build. Exit code 1 where a file does not compile, with the
+first messages of each. All of them take two processors ten minutes.
 """
 
 import concurrent.futures
@@ -53,7 +53,8 @@ def clang_options(command):
 
 def compile_alone(clang, file, directory, command):
     """Messages; empty where it compiles."""
-    done = subprocess.run([clang, *clang_options(command), f"-I{MADE}", "-fsyntax-only", "-ferror-limit=3"], cwd=directory, capture_output=True,
+    done = subprocess.run([clang, *clang_options(command), f"-I{MADE}", "-fsyntax-only", "-ferror-limit=3"],
+                          cwd=directory, capture_output=True,
                           text=True, check=False)
     return done.stderr if done.returncode else ""
 

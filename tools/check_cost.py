@@ -6,9 +6,10 @@
     tools/check_cost.py [BUILD] --most SECONDS   ends with 1, naming it, where an object took longer
     tools/check_cost.py --self-test
 
-Seconds are those on the clock: compilations that waited for a processor look dearer than they are, and what a compiler cache
-handed out looks free. `--most` therefore allows for that much of waiting: what the machine's load was beyond its processors.
-It is meant for a machine that compiles PROBE in PROBE_SECONDS of processor; on a slower one it is so much more.
+Seconds are those on the clock: compilations that waited for a processor look dearer than they are, and what a compiler
+cache handed out looks free. `--most` therefore allows for that much of waiting: what the machine's load was beyond its
+processors. It is meant for a machine that compiles PROBE in PROBE_SECONDS of processor; on a slower one it is so much
+more.
 """
 
 import argparse
@@ -72,7 +73,8 @@ def slowness(compiler="g++"):
         taken = []
         for _ in range(3):
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            subprocess.run([compiler, "-std=c++20", "-O1", "-isystem", "/usr/include/eigen3", "-c", "probe.cpp", "-o", "probe.o"],
+            subprocess.run([compiler, "-std=c++20", "-O1", "-isystem", "/usr/include/eigen3", "-c", "probe.cpp", "-o",
+                            "probe.o"],
                            cwd=folder, check=True, env={**os.environ, "CCACHE_DISABLE": "1"})
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             taken.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)

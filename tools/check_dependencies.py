@@ -5,8 +5,8 @@
     check_dependencies.py               exit code 1 where the build's files, tools/setup.sh, package.json or
                                         docs/inside/dependencies.md say something else
     check_dependencies.py --write       writes docs/inside/dependencies.md
-    check_dependencies.py --sbom FILE   writes a bill of materials of what is distributed (CycloneDX 1.4, JSON), with the
-                                        versions that dpkg has where it has them
+    check_dependencies.py --sbom FILE   writes a bill of materials of what is distributed (CycloneDX 1.4, JSON), with
+                                        the versions that dpkg has where it has them
     check_dependencies.py --self-test   the check notices what it is for
 """
 
@@ -33,30 +33,32 @@ USES = {
 }
 PROGRAM = ("library", "program", "report", "build")  # of what the first command installs
 DISTRIBUTED = ("library", "program", "report", "python")
-LINKED = {"headers": "headers, compiled in", "static": "statically", "shared": "dynamically", "embedded": "embedded", "run": "run, not linked"}
+LINKED = {"headers": "headers, compiled in", "static": "statically", "shared": "dynamically", "embedded": "embedded",
+          "run": "run, not linked"}
 # Ours, or part of the C library.
 NOT_LISTED = {"Wheelwright", "Threads"}
 
 INTRODUCTION = """# Dependencies and licences
 
 Wheelwright is under [Apache-2.0](https://www.apache.org/licenses/LICENSE-2.0). This is what it is built, tested and
-documented with: Debian 12's packages, and uPlot from npm. The list is `tools/cmake/dependencies.json`; this page is made from it
-by `tools/check_dependencies.py --write`, and a test compares it with the build's files and `tools/setup.sh`. Licences are
-[SPDX](https://spdx.org/licenses/) expressions of the parts that are used, after Debian's copyright files; versions are those
-of Debian 12 without its own suffixes. The Debian package `wheelwright` has the part that is distributed as a CycloneDX bill
-of materials, with the exact versions it was built with.
+documented with: Debian 12's packages, and uPlot from npm. The list is `tools/cmake/dependencies.json`; this page is made from
+it by `tools/check_dependencies.py --write`, and a test compares it with the build's files and `tools/setup.sh`.
+Licences are [SPDX](https://spdx.org/licenses/) expressions of the parts that are used, after Debian's copyright files;
+versions are those of Debian 12 without its own suffixes. The Debian package `wheelwright` has the part that is
+distributed as a CycloneDX bill of materials, with the exact versions it was built with.
 """
 
 QUESTIONS = """## Licence questions
 
-- **The report page** holds uPlot's script and style sheet. Its MIT notice stands in every page in front of the script, and in
-  the packages' copyright files.
-- **Headers that are compiled in** (Eigen, Boost, fmt, JSON for Modern C++, CLI11, pybind11) are under MPL-2.0, BSL-1.0, MIT
-  and BSD-3-Clause. MPL-2.0 asks that changes to Eigen's own files stay available: there are none. The copyright files of
-  the packages name their authors.
-- **Ceres** is linked statically (Debian's CMake package gives that) and brings CHOLMOD of SuiteSparse, linked dynamically,
-  parts of which are under GPL-2.0-or-later. Wheelwright is a work of its own under Apache-2.0, which GPL-3.0 admits; who
-  ships the program *together with* that CHOLMOD follows the GPL for the whole. The detector (`Wheelwright::detector` and what is below it) links neither Ceres nor NLopt.
+- **The report page** holds uPlot's script and style sheet. Its MIT notice stands in every page in front of the
+  script, and in the packages' copyright files.
+- **Headers that are compiled in** (Eigen, Boost, fmt, JSON for Modern C++, CLI11, pybind11) are under MPL-2.0, BSL-1.0,
+  MIT and BSD-3-Clause. MPL-2.0 asks that changes to Eigen's own files stay available: there are none. The copyright
+  files of the packages name their authors.
+- **Ceres** is linked statically (Debian's CMake package gives that) and brings CHOLMOD of SuiteSparse, linked
+  dynamically, parts of which are under GPL-2.0-or-later. Wheelwright is a work of its own under Apache-2.0, which
+  GPL-3.0 admits; who ships the program *together with* that CHOLMOD follows the GPL for the whole. The detector
+  (`Wheelwright::detector` and what is below it) links neither Ceres nor NLopt.
 - **CLP** is under EPL-1.0, which does not go together with the GPL in one distributed program. Only benchmarks link it.
 - **GLPK and QSopt_ex** (GPL) are linked by benchmarks and tests, which are not packaged.
 - **SQLite** is in the public domain; `blessing` is what SPDX calls that.
@@ -86,7 +88,8 @@ def cmake_files(root):
 
 
 def setup_packages(text):
-    """Debian packages of tools/setup.sh by option: those of the program, what "" adds to them, and an option to that."""
+    """Debian packages of tools/setup.sh by option: those of the program, what "" adds to them, and an option to
+    that."""
     listed = lambda variable: set(re.search(rf'^{variable}="([^"]*)"', text, re.M).group(1).split())
     packages = {"program": listed("packages"), "": listed("everything")}
     for option, words in re.findall(r'^\s*(--\w+)\) everything="\$everything ([^"]*)"', text, re.M):
@@ -131,18 +134,21 @@ def complaints(dependencies, in_library, in_build, setup, npm, page):
 def markdown(dependencies):
     out = INTRODUCTION
     for use, title in USES.items():
-        out += f"\n## {title}\n\n| name | Debian package | version | licence | linked | for |\n|---|---|---|---|---|---|\n"
+        out += f"\n## {title}\n\n| name | Debian package | version | licence | linked | for |\n"
+        out += "|---|---|---|---|---|---|\n"
         for entry in dependencies:
             if entry["use"] == use:
                 where = ", ".join(f"`{package}`" for package in entry.get("packages", [])) or f"npm: `{entry['npm']}`"
-                out += (f"| {entry['name']} | {where} | {entry['version']} | {entry['licence']} | {LINKED[entry['linked']]} "
+                out += (f"| {entry['name']} | {where} | {entry['version']} | {entry['licence']} "
+                        f"| {LINKED[entry['linked']]} "
                         f"| {entry['for']} |\n")
     return out + "\n" + QUESTIONS
 
 
 def installed_version(package):
     try:
-        done = subprocess.run(["dpkg-query", "-W", "-f=${Version}", package], capture_output=True, text=True, check=False)
+        done = subprocess.run(["dpkg-query", "-W", "-f=${Version}", package], capture_output=True, text=True,
+                              check=False)
     except FileNotFoundError:
         return ""
     return done.stdout if done.returncode == 0 else ""
@@ -161,7 +167,8 @@ def bill_of_materials(dependencies, version):
         else:
             package = entry["packages"][0]
             component["version"] = installed_version(package) or entry["version"]
-            component["purl"] = f"pkg:deb/debian/{package}@{component['version'].replace('+', '%2B').replace(':', '%3A')}"
+            version = component["version"].replace("+", "%2B").replace(":", "%3A")
+            component["purl"] = f"pkg:deb/debian/{package}@{version}"
         components.append(component)
     return {"bomFormat": "CycloneDX", "specVersion": "1.4", "version": 1,
             "metadata": {"component": {"type": "application", "name": "wheelwright", "version": version,
@@ -180,13 +187,16 @@ def gather(root):
 
 
 def self_test():
-    assert named_in_cmake("find_package(A 3 REQUIRED)\n# find_package(B)\npkg_check_modules(C REQUIRED IMPORTED_TARGET c>=2)\n"
+    assert named_in_cmake("find_package(A 3 REQUIRED)\n# find_package(B)\n"
+                          "pkg_check_modules(C REQUIRED IMPORTED_TARGET c>=2)\n"
                           "find_library(D_LIBRARY d)\n") == {"A", "pkg:c", "d"}
-    assert setup_packages('packages="a b\n  c"\neverything="e"\ncase x in\n  --ci) everything="$everything d" ;;\n') == {
+    assert setup_packages('packages="a b\n  c"\neverything="e"\n'
+                          'case x in\n  --ci) everything="$everything d" ;;\n') == {
         "program": {"a", "b", "c"}, "": {"e"}, "--ci": {"d"}}
     good = [{"name": "A", "packages": ["a"], "cmake": ["A"], "licence": "MIT", "version": "1", "use": "library",
              "linked": "headers", "for": "nothing"},
-            {"name": "U", "npm": "u", "licence": "MIT", "version": "2", "use": "report", "linked": "embedded", "for": "charts"}]
+            {"name": "U", "npm": "u", "licence": "MIT", "version": "2", "use": "report", "linked": "embedded",
+             "for": "charts"}]
     page = markdown(good)
     right = (good, {"A"}, {"A"}, {"program": {"a"}}, {"u": "2"}, page)
     assert complaints(*right) == []
@@ -206,7 +216,8 @@ def main():
     if arguments.self_test:
         self_test()
     elif arguments.sbom:
-        version = re.search(r"^project\(Wheelwright VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(), re.M).group(1)
+        version = re.search(r"^project\(Wheelwright VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text(),
+                            re.M).group(1)
         arguments.sbom.write_text(json.dumps(bill_of_materials(load(ROOT), version), indent=2) + "\n", encoding="utf-8")
     elif arguments.write:
         (ROOT / PAGE).write_text(markdown(load(ROOT)), encoding="utf-8")

@@ -128,13 +128,18 @@ OUTSIDE = {
 SOLVERS_IN_SOURCES_ONLY = r"ceres/|nlopt|[Cc]lp|[Cc]oin|mpi\.h$"
 
 # Paths of somebody's machine have no place in the project; written so that this file does not name them.
-PRIVATE_PATHS = re.compile(r"(?<![\w.~-])/(?:" + "wor" + r"k(?![\w-])|" + "tmp/bash" + r"_jobs|" + "roo" + r"t/|" + "hom" + r"e/\w)")
+PRIVATE_PATHS = re.compile(r"(?<![\w.~-])/(?:" + "wor" + r"k(?![\w-])|" + "tmp/bash" + r"_jobs|" + "roo" + r"t/|"
+                           + "hom" + r"e/\w)")
 
+WIDTH = 120  # of lines, in characters; what clang-format breaks, and comments and scripts beside it
+NARROW = {".hpp", ".cpp", ".cmake", ".py", ".sh"}
 CODE = {".hpp", ".cpp", ".cmake", ".py", ".sh", ".js", ".css"}
 TEXT = CODE | {".md", ".yaml", ".yml", ".json", ".txt", ".cff", ".bib", ".in", ""}
 SKIP = re.compile(r"^(?:\.git|\.cache|build.*|node_modules|out|__pycache__)$")
-# A type that is defined in two headers of one namespace is two types of one name to the linker, which keeps one of them.
+# A type that is defined in two headers of one namespace is two types of one name to the linker, which keeps one of
+# them.
 TYPE = re.compile(r"^(?:(?:struct|class|enum class|enum)\s+(\w+)\b(?!\s*<)[^;]*$|using\s+(\w+)\s*=)", re.M)
+LENT = re.compile(r"(?:(?:using \w+|namespace \w+ = \w+)::\w+;\n)+\}")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 # Programs that use the installed library, or stand for one.
 USERS = re.compile(r"(?:examples|tests/consumer)/")
@@ -196,9 +201,10 @@ def check_space(module, relative, text, report):
     """Code of a module is in the module's namespace; in wheelwright itself stands what a header lends it."""
     space = "wheelwright::" + SPACE.get(module, module)
     for opened in re.finditer(r"^namespace (wheelwright(?:::\w+)*) \{\n", text, re.M):
-        lent = relative.suffix == ".hpp" and re.compile(r"(?:(?:using \w+|namespace \w+ = \w+)::\w+;\n)+\}").match(text, opened.end())
+        lent = relative.suffix == ".hpp" and LENT.match(text, opened.end())
         if not f"{opened.group(1)}::".startswith(f"{space}::") and not (opened.group(1) == "wheelwright" and lent):
-            report(relative, text[: opened.start()].count("\n") + 1, f"namespace {opened.group(1)} in {module}: expected {space}")
+            report(relative, text[: opened.start()].count("\n") + 1,
+                   f"namespace {opened.group(1)} in {module}: expected {space}")
 
 
 def check_links(module, relative, text, report):
@@ -251,6 +257,12 @@ def check_private(module, relative, text, public, installed, report):
             report(relative, number, f"{header} is not installed, {relative} is")
 
 
+def check_width(relative, text, report):
+    for number, line in enumerate(text.splitlines(), 1):
+        if len(line) > WIDTH:
+            report(relative, number, f"{len(line)} columns: expected at most {WIDTH}")
+
+
 def check_list(root, report):
     """The folders that CMakeLists.txt builds are those of the table."""
     path = root / "CMakeLists.txt"
@@ -292,6 +304,8 @@ def check(root):
         if path.suffix in CODE or path.name == "CMakeLists.txt" or script:
             if not re.search(r"SPDX-License-Identifier: Apache-2\.0", "\n".join(text.splitlines()[:3])):
                 report(relative, 1, "no SPDX-License-Identifier: Apache-2.0 in the first lines")
+        if path.suffix in NARROW or path.name == "CMakeLists.txt" or script:
+            check_width(relative, text, report)
         for number, line in enumerate(text.splitlines(), 1):
             named = PRIVATE_PATHS.search(line)
             if named:
@@ -310,6 +324,7 @@ def check(root):
 
 def self_test():
     spdx = "// SPDX-License-Identifier: Apache-2.0\n"
+    hash_spdx = "# SPDX-License-Identifier: Apache-2.0\n"
     head = spdx + "#pragma once\n"
     # A module's name behind @ stands for its folder.
     placed = lambda text: re.sub(r'@(\w+)/', lambda m: MODULES[m[1]] + '/', text)
@@ -320,8 +335,10 @@ def self_test():
         "@files/c.cpp": spdx + '#include <fstream>\n#include "@core/a.hpp"\n',
         "@identify/inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
         "@study/work_on_ranks.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
-        "@detector/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(detector\n  USES core filter\n  LINK x)\n",
-        "@model/filter/CMakeLists.txt": "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",
+        "@detector/CMakeLists.txt": hash_spdx + "wheelwright_room(detector\n  USES core filter\n  LINK x)\n",
+        "@model/filter/CMakeLists.txt": hash_spdx + "wheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",
+        "@core/wide.cpp": spdx + "// " + "Δ" * (WIDTH - 3) + "\n",
+        "docs/wide.md": "x" * 200 + "\n",
         "@detector/shared.cpp": spdx + '#include "@filter/s.hpp"\n',
         "examples/e.cpp": spdx + "#include <wheelwright/core/a.hpp>\n",
         "docs/framework.md": "framework/works on http://host/working and a/" + "work\n",
@@ -333,14 +350,14 @@ def self_test():
         "a format in report": ("@report/x.cpp", spdx + '#include "@robots/s.hpp"\n'),
         "private header": ("@detector/y.cpp", spdx + '#include "@filter/b.hpp"\n#include "@filter/c.hpp"\n'),
         "not installed": ("@filter/a.hpp", head + '#include "@filter/s.hpp"\n'),
-        "linked upwards": ("@identify/CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nwheelwright_room(identify\n  USES core bounds)\n"),
+        "linked upwards": ("@identify/CMakeLists.txt", hash_spdx + "wheelwright_room(identify\n  USES core bounds)\n"),
         "another module's namespace": ("@bounds/x.cpp", spdx + "namespace wheelwright::core {\n}\n"),
         "no module's namespace": ("@bounds/x.hpp", head + "namespace wheelwright {\nint f();\n}\n"),
         "our header by the installed name": ("@bounds/x.cpp", spdx + "#include <wheelwright/core/a.hpp>\n"),
         "our header by its place in an example": ("examples/x.cpp", spdx + '#include "@core/a.hpp"\n'),
         "a header without its folder": ("@bounds/x.cpp", spdx + '#include "b.hpp"\n'),
-        "a folder that is not built": ("CMakeLists.txt", "# SPDX-License-Identifier: Apache-2.0\nset(WHEELWRIGHT_ROOMS " +
-                                       " ".join(list(MODULES.values())[1:]) + ")\n"),
+        "a folder that is not built": ("CMakeLists.txt", hash_spdx + "set(WHEELWRIGHT_ROOMS " +
+                                       "\n".join(list(MODULES.values())[1:]) + ")\n"),
         "file opened": ("@commission/x.cpp", spdx + "#include <fstream>\n"),
         "printing": ("@filter/x.cpp", spdx + "void f() { std::cout << 1; }\n"),
         "clock": ("@identify/x.cpp", spdx + "#include <chrono>\n"),
@@ -356,6 +373,10 @@ def self_test():
         "no licence in a script": ("tools/x", "#!/bin/sh\ntrue\n"),
         "one name, two types": ("@detector/x.hpp", head + "class A final {\n};\n"),
         "one name, a type and an alias": ("@detector/x.hpp", head + "using A = int;\n"),
+        "a wide line": ("@core/x.cpp", spdx + "// " + "x" * (WIDTH - 2) + "\n"),
+        "a wide line of CMake": ("@core/CMakeLists.txt", hash_spdx + "set(x " + "x" * WIDTH + ")\n"),
+        "a wide line of a script": ("tools/x", "#!/bin/sh\n" + hash_spdx + "true " + "x" * WIDTH + "\n"),
+        "a wide line of Python": ("tools/x.py", hash_spdx + "x = " + "1" * WIDTH + "\n"),
         "no guard": ("@core/x.hpp", spdx),
         "private path": ("docs/x.md", "see /" + "work/main\n"),
         "another private path": ("examples/x.yaml", "log: /" + "tmp/bash_jobs.0/x\n"),

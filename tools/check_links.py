@@ -90,8 +90,10 @@ def self_test():
             return len(list(wrong_in(page, root)))
 
         assert anchors("# A [link](x) & `b_c` — d\n") == {"a-link--b_c--d"}
-        assert wrong("[a](docs/a.md#one-two-three) [b](docs/a.md#again-1) [c](https://nowhere.example/x) `core/log.hpp`\n"
-                     "`[d](e)` `result/model.json` `build/x.json`\n\n    [e](in/code.md)\n\n```\n[f](in/code.md)\n```\n") == 0
+        assert wrong("[a](docs/a.md#one-two-three) [b](docs/a.md#again-1) [c](https://nowhere.example/x) "
+                     "`core/log.hpp`\n"
+                     "`[d](e)` `result/model.json` `build/x.json`\n\n    [e](in/code.md)\n\n"
+                     "```\n[f](in/code.md)\n```\n") == 0
         assert wrong("# Here\n[a](#here)\n") == 0
         for text in ("[a](docs/b.md)", "[a](docs/a.md#two)", "[a](docs/a.md#again-2)", "[a](#here)", "`core/lag.hpp`",
                      "- x\n    [a](docs/b.md)", "    code\n\nprose [a](docs/b.md)"):

@@ -6,7 +6,8 @@
 #
 #   tools/check_package.sh ROOT [PACKAGES]
 #
-# ROOT gets the Debian (tools/fresh_root.sh makes it); PACKAGES (build/packages) is where tools/package.sh put the packages.
+# ROOT gets the Debian (tools/fresh_root.sh makes it); PACKAGES (build/packages) is where tools/package.sh put the
+# packages.
 set -eu
 root=${1:?usage: tools/check_package.sh ROOT [PACKAGES]}
 cd "$(dirname "$0")/.."
@@ -57,7 +58,8 @@ if ls python3-wheelwright_*.deb >/dev/null 2>&1; then
   python3 -c "
 import wheelwright as ww
 assert ww.__file__.startswith('/usr/lib/python3/dist-packages/')
-run = ww.Detector(ww.read_model('first/model.json')).run(ww.read_log('fault.csv', ww.read_robot('$examples/robot.yaml')))
+log = ww.read_log('fault.csv', ww.read_robot('$examples/robot.yaml'))
+run = ww.Detector(ww.read_model('first/model.json')).run(log)
 assert run.events
 print(len(run.events), 'events')"
 fi

@@ -5,9 +5,9 @@
     check_tidy.py [FOLDER...]    folders of this repository (bounds, logs, ...); without one all but
                                   tests and examples
 
-Checks, and why some are left out, stand in .clang-tidy. build/ has to be built: its unity sources are read, since most of
-the time goes into the headers of libraries, and these are then read once for twelve files. Exit code 1 where something is found,
-each told once. All of it takes two processors half an hour.
+Checks, and why some are left out, stand in .clang-tidy. build/ has to be built: its unity sources are read, since most
+of the time goes into the headers of libraries, and these are then read once for twelve files. Exit code 1 where
+something is found, each told once. All of it takes two processors half an hour.
 """
 
 import concurrent.futures

@@ -9,11 +9,11 @@
 
     --room ROOM    this room alone; may be given several times
 
-A line can run when GCC made code of it in any object: templates that nothing instantiates and inline functions that nothing
-calls are not counted, nor are lines without a letter or digit, nor a second `return` of a constant that GCC joins with the
-first. Runs of a line are added up over objects and instantiations. A process that is killed, or ends by _exit, leaves no
-counts: what only such processes reach is listed as not run. One that is killed while it writes them damages a file, and
-later processes say so on standard error (`Merge mismatch`).
+A line can run when GCC made code of it in any object: templates that nothing instantiates and inline functions that
+nothing calls are not counted, nor are lines without a letter or digit, nor a second `return` of a constant that GCC
+joins with the first. Runs of a line are added up over objects and instantiations. A process that is killed, or ends by
+_exit, leaves no counts: what only such processes reach is listed as not run. One that is killed while it writes them
+damages a file, and later processes say so on standard error (`Merge mismatch`).
 """
 
 import argparse
@@ -122,9 +122,11 @@ def self_test():
             (root / name).write_text(text, encoding="utf-8")
         (root / "build/include").symlink_to(root / "core")
         for name in ("build/unity.cpp", "tests/main.cpp"):
-            subprocess.run(["g++", "--coverage", "-I.", "-Ibuild", "-c", name, "-o", f"build/{Path(name).stem}.o"], cwd=root,
+            subprocess.run(["g++", "--coverage", "-I.", "-Ibuild", "-c", name, "-o", f"build/{Path(name).stem}.o"],
+                           cwd=root,
                            check=True)
-        subprocess.run(["g++", "--coverage", "build/unity.o", "build/main.o", "-o", "build/program"], cwd=root, check=True)
+        subprocess.run(["g++", "--coverage", "build/unity.o", "build/main.o", "-o", "build/program"], cwd=root,
+                       check=True)
         subprocess.run(["build/program"], cwd=root, check=True)
         counts, lines = only_words(counts_of(root / "build", root), root)
         assert set(counts) == {"core/a.hpp", "core/a.cpp", "bounds/b.cpp"}, counts

@@ -19,7 +19,8 @@ WHEELWRIGHT_VERSION=$(sed -n 's/^project(Wheelwright VERSION \([0-9.]*\).*/\1/p'
 WHEELWRIGHT_EXTRA=$site/source/extra
 export WHEELWRIGHT_VERSION WHEELWRIGHT_EXTRA
 
-rooms='core model filter bounds detector files logs robots sim identify commission inference doctor design gap study words results export report'
+rooms='core model filter bounds detector files logs robots sim identify commission inference doctor design gap study'
+rooms="$rooms words results export report"
 {
   cat docs/site/Doxyfile
   echo "PROJECT_NUMBER = $WHEELWRIGHT_VERSION"

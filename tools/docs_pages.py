@@ -3,8 +3,9 @@
 """The pages of the documentation that are made from the program, the schemas and the headers.
 
     docs_pages.py PROGRAM TAGS OUT      OUT/commands.md: the --help of every command; OUT/files.md: the JSON files by
-                                        their schemas; OUT/api.md: the installed headers by room, with links into Doxygen's pages,
-                                        which its tag file TAGS lists; OUT/references.md: the bibliography
+                                        their schemas; OUT/api.md: the installed headers by room, with links into
+                                        Doxygen's pages, which its tag file TAGS lists; OUT/references.md: the
+                                        bibliography
     docs_pages.py --check SITE          exit code 1 where a page of SITE links to what SITE does not have, or fetches
                                         anything from the network
 """
@@ -25,7 +26,8 @@ import check_layers
 
 ROOT = Path(__file__).resolve().parent.parent
 ROOMS = {
-    "core": "errors, argument checks, outward-rounded intervals, log table, regression rows, linear algebra, statistics",
+    "core": "errors, argument checks, outward-rounded intervals, log table, regression rows, linear algebra, "
+            "statistics",
     "model": "robots as data, their faults and effects",
     "filter": "row filters (torque, odometry), batch and streaming, and propagation of noise bounds through them",
     "bounds": "feasible parameter set, interval hull, support function, certificates",
@@ -49,7 +51,8 @@ ROOMS = {
 
 def help_of(program, *words):
     environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "100"}
-    return subprocess.run(["wheelwright", *words, "--help"], executable=program, capture_output=True, text=True, check=True,
+    return subprocess.run(["wheelwright", *words, "--help"], executable=program, capture_output=True, text=True,
+                          check=True,
                           env=environment).stdout
 
 
@@ -58,7 +61,8 @@ def wrapped(line, width=92):
     if len(line) <= width:
         return line
     column = re.match(r"(\s*)(\S.*?\s{2,})?", line).end()
-    return textwrap.fill(line, width, subsequent_indent=" " * (column if column < width // 2 else 2), break_on_hyphens=False,
+    return textwrap.fill(line, width, subsequent_indent=" " * (column if column < width // 2 else 2),
+                         break_on_hyphens=False,
                          break_long_words=False, drop_whitespace=True)
 
 
@@ -146,7 +150,8 @@ def api(tags):
     for compound in ElementTree.parse(tags).getroot().iterfind("compound[@kind='file']"):
         place = os.path.relpath(compound.findtext("path", ""), ROOT)
         pages[f"{place}/{compound.findtext('name')}"] = compound.findtext("filename", "")
-    out = ("# C++ library\n\nOne target for each room: `find_package(Wheelwright 0.1 REQUIRED COMPONENTS detector)`, then "
+    out = ("# C++ library\n\n"
+           "One target for each room: `find_package(Wheelwright 0.1 REQUIRED COMPONENTS detector)`, then "
            "`target_link_libraries(… Wheelwright::detector)`. Headers are `<wheelwright/ROOM/HEADER>`. "
            '<a href="../api/index.html">All pages</a>, <a href="../api/annotated.html">all types</a>.\n')
     public = check_layers.public_headers(ROOT)
@@ -162,7 +167,8 @@ def api(tags):
     return out
 
 
-REFERENCES = ("# References\n\nWorks that the project stands on, by the keys that pages and comments name. A number in brackets "
+REFERENCES = ("# References\n\n"
+              "Works that the project stands on, by the keys that pages and comments name. A number in brackets "
               "without a key, such as (23), is an equation of dixon2001.\n\n```{bibliography}\n:all:\n```\n")
 
 
@@ -207,7 +213,8 @@ def main():
         return 1 if found else 0
     program, tags, out = sys.argv[1], sys.argv[2], Path(sys.argv[3])
     out.mkdir(parents=True, exist_ok=True)
-    for name, text in {"commands": commands(program), "files": files(), "api": api(tags), "references": REFERENCES}.items():
+    for name, text in {"commands": commands(program), "files": files(), "api": api(tags),
+                       "references": REFERENCES}.items():
         (out / f"{name}.md").write_text(text, encoding="utf-8")
     return 0
 

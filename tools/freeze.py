@@ -84,7 +84,8 @@ def shipped_runs():
 
 def recorded_runs():
     data = SHARED / "data"
-    for name, log in (("emps", "emps/emps.csv"), ("warthog", "warthog/current.csv"), ("regbot", "regbot_fleet/run_00.csv")):
+    for name, log in (("emps", "emps/emps.csv"), ("warthog", "warthog/current.csv"),
+                      ("regbot", "regbot_fleet/run_00.csv")):
         robot = str(data / f"{name}.yaml")
         for command in ("commission", "identify", "doctor", "gap"):
             if (name, command) == ("regbot", "gap"):  # six seconds, of which nothing is left to compare
@@ -137,7 +138,8 @@ def results_of(run, program, folder, words):
     here.mkdir()
     environment = dict(os.environ, GLIBC_TUNABLES="glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F", LC_ALL="C")
     # Results name the files they come from: as seen from the run's folder, wherever this repository lies.
-    call = [word.replace(str(ROOT / "examples"), "../shipped").replace(str(SHARED), "../recorded") for word in run.words]
+    call = [word.replace(str(ROOT / "examples"), "../shipped").replace(str(SHARED), "../recorded")
+            for word in run.words]
     done = subprocess.run([program, *call], cwd=here, env=environment, capture_output=True, check=False)
     found = {"exit": done.returncode}
     if "--json" in run.words:

@@ -54,14 +54,16 @@ for what in proc dev dev/pts; do
 done
 
 # The variables that say how to reach the network, and none other.
-variables=$(env | grep -iE '^(https?_proxy|no_proxy|all_proxy|NODE_EXTRA_CA_CERTS|SSL_CERT_FILE|SSL_CERT_DIR|npm_config_[a-z_]+)=' || true)
+passed='https?_proxy|no_proxy|all_proxy|NODE_EXTRA_CA_CERTS|SSL_CERT_FILE|SSL_CERT_DIR|npm_config_[a-z_]+'
+variables=$(env | grep -iE "^($passed)=" || true)
 inside() {
   # shellcheck disable=SC2086
   env -i PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 $variables \
     chroot "$root" /bin/sh -c "$1"
 }
 
-inside 'command -v git >/dev/null || { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends git >/dev/null; }'
+inside 'command -v git >/dev/null || { apt-get update -qq &&
+  DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends git >/dev/null; }'
 echo "fresh root: cloning $(git -C "$source" rev-parse --short HEAD)"
 rm -rf "$root/wheelwright" "$root/source.git"
 git clone -q --bare "$source" "$root/source.git"

@@ -8,7 +8,8 @@
     tools/house.py --names         and each comparison with the name of an effect or of a model outside readers
     tools/house.py --self-test
 
-Counted is what git keeps. A reader is a file that turns text into what it names: everything in files, logs, robots, results.
+Counted is what git keeps. A reader is a file that turns text into what it names: everything in files, logs, robots,
+results.
 """
 
 import argparse
@@ -29,7 +30,8 @@ TWIN_LINES = 8
 
 
 def tracked(root):
-    names = subprocess.run(["git", "-C", root, "ls-files", "*.hpp", "*.cpp"], capture_output=True, text=True, check=True)
+    names = subprocess.run(["git", "-C", root, "ls-files", "*.hpp", "*.cpp"], capture_output=True, text=True,
+                           check=True)
     return {name: (root / name).read_text(encoding="utf-8") for name in names.stdout.split()}
 
 
@@ -83,7 +85,8 @@ def twins_by_name(files):
     where = defaultdict(set)
     for name, text in files.items():
         if name.endswith(".cpp") and room_of(name) in PRODUCT:
-            for function, parameters in re.findall(r"^[A-Za-z][\w:<>,*& ]* \*?&?(\w+)\(([^;{}()]*)\) (?:const )?\{", text, re.M):
+            for function, parameters in re.findall(r"^[A-Za-z][\w:<>,*& ]* \*?&?(\w+)\(([^;{}()]*)\) (?:const )?\{",
+                                                   text, re.M):
                 where[function, parameters.count(",") + bool(parameters.strip())].add(room_of(name))
     return {key: rooms for key, rooms in where.items() if len(rooms) > 1 and key[0] not in ("main", "run", "validate")}
 
@@ -118,7 +121,8 @@ def table(root, files):
         ("of them used by no other room", len(unused), 0),
         ("comparisons with names of effects, outside readers", len(comparisons(files, effects)), 0),
         ("comparisons with names of models, outside readers", len(comparisons(files, models)), 0),
-        (f"lines over {WIDTH} columns", sum(len(line) > WIDTH for text in files.values() for line in text.splitlines()), 0),
+        (f"lines over {WIDTH} columns",
+         sum(len(line) > WIDTH for text in files.values() for line in text.splitlines()), 0),
         ("functions of one name in two rooms", len(twins_by_name(files)), None),
         (f"pairs of files with {TWIN_LINES} equal lines", len(twins_by_text(files)), None),
     ]

@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
 #
-# Makes the Debian packages (wheelwright, libwheelwright-dev, python3-wheelwright) of the release build, and lets lintian
-# look at them: an error of its is one here.
+# Makes the Debian packages (wheelwright, libwheelwright-dev, python3-wheelwright) of the release build, and lets
+# lintian look at them: an error of its is one here.
 #
 #   tools/package.sh [--built] [DIRECTORY]
 #
@@ -38,5 +38,6 @@ tools/check_elf.py "$out"/*.deb
 # The address is whoever's who packs, and this is no upload to Debian.
 as_root=''
 [ "$(id -u)" -ne 0 ] || as_root=--allow-root
-lintian $as_root --fail-on error --suppress-tags bogus-mail-host,bogus-mail-host-in-debian-changelog,initial-upload-closes-no-bugs "$out"/*.deb
+suppressed=bogus-mail-host,bogus-mail-host-in-debian-changelog,initial-upload-closes-no-bugs
+lintian $as_root --fail-on error --suppress-tags "$suppressed" "$out"/*.deb
 ls -l "$out"

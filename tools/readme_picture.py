@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The picture of the README: a residual between its thresholds, and the fault that takes it out of them.
 
-    readme_picture.py PROGRAM [SVG]     commissions the shipped log with PROGRAM, simulates examples/scenarios/fault.yaml,
-                                        detects with --series, and draws the difference channel into SVG (docs/residual.svg)
+    readme_picture.py PROGRAM [SVG]     commissions the shipped log with PROGRAM, simulates
+                                        examples/scenarios/fault.yaml, detects with --series, and draws the difference
+                                        channel into SVG (docs/residual.svg)
 """
 
 import csv
@@ -27,13 +28,15 @@ def measured(program):
     scenario = ROOT / "examples/scenarios/fault.yaml"
     with tempfile.TemporaryDirectory() as folder:
         def run(*words, allowed=(0,)):
-            done = subprocess.run([program, *map(str, words), "--quiet"], cwd=folder, capture_output=True, text=True, check=False)
+            done = subprocess.run([program, *map(str, words), "--quiet"], cwd=folder, capture_output=True, text=True,
+                                  check=False)
             if done.returncode not in allowed:
                 sys.exit(f"readme_picture: {' '.join(map(str, words))}: {done.stderr}")
 
         run("commission", ROOT / "examples/healthy.csv.gz", "--robot", ROOT / "examples/robot.yaml", "--out", "model")
         run("simulate", scenario, "--out", "fault.csv")
-        run("detect", "fault.csv", "--model", "model/model.json", "--out", "found", "--series", "series.csv", allowed=(1,))
+        run("detect", "fault.csv", "--model", "model/model.json", "--out", "found", "--series", "series.csv",
+            allowed=(1,))
         with open(Path(folder) / "series.csv", encoding="utf-8", newline="") as file:
             series = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
         detection = json.loads((Path(folder) / "found/detection.json").read_text(encoding="utf-8"))
@@ -46,7 +49,8 @@ def columns(rows, key):
     cells = {}
     for row in rows:
         cells.setdefault(int((row["t"] - SHOWN[0]) / (SHOWN[1] - SHOWN[0]) * LINES), []).append((row["t"], row[key]))
-    return [(sum(t for t, _ in cell) / len(cell), min(y for _, y in cell), max(y for _, y in cell)) for _, cell in sorted(cells.items())]
+    return [(sum(t for t, _ in cell) / len(cell), min(y for _, y in cell), max(y for _, y in cell))
+            for _, cell in sorted(cells.items())]
 
 
 def svg(series, events, onset):
@@ -75,25 +79,32 @@ def svg(series, events, onset):
     for event in events:
         begin, end = max(event["start"], SHOWN[0]), min(event["end"], SHOWN[1])
         if begin < end:
-            out.append(f'<rect x="{x(begin):.1f}" y="{TOP}" width="{x(end) - x(begin):.1f}" height="{bottom - TOP}" fill="#fde4df"/>')
+            out.append(f'<rect x="{x(begin):.1f}" y="{TOP}" width="{x(end) - x(begin):.1f}" '
+                       f'height="{bottom - TOP}" fill="#fde4df"/>')
     out += [f'<path d="{band}" fill="#cfe3f5" stroke="#4a86bd" stroke-width="0.8"/>',
             f'<path d="{path(both_ends)}" fill="none" stroke="#b3261e" stroke-width="1.3" stroke-linejoin="round"/>']
     step = 0.05
     for tick in range(-int(largest / step), int(largest / step) + 1):
         at = y(tick * step)
         label = f"{tick * step:.2f}".replace("-", "−")
-        out.append(f'<path d="M{LEFT - 4},{at:.1f}h4" stroke="#222"/><text x="{LEFT - 8}" y="{at + 4:.1f}" text-anchor="end">{label}</text>')
+        out.append(f'<path d="M{LEFT - 4},{at:.1f}h4" stroke="#222"/>'
+                   f'<text x="{LEFT - 8}" y="{at + 4:.1f}" text-anchor="end">{label}</text>')
     for t in range(int(SHOWN[0]), int(SHOWN[1]) + 1, 5):
-        out.append(f'<path d="M{x(t):.1f},{bottom}v4" stroke="#222"/><text x="{x(t):.1f}" y="{bottom + 18}" text-anchor="middle">{t}</text>')
-    out += [f'<rect x="{LEFT}" y="{TOP}" width="{WIDTH - LEFT - RIGHT}" height="{bottom - TOP}" fill="none" stroke="#222"/>',
+        out.append(f'<path d="M{x(t):.1f},{bottom}v4" stroke="#222"/>'
+                   f'<text x="{x(t):.1f}" y="{bottom + 18}" text-anchor="middle">{t}</text>')
+    out += [f'<rect x="{LEFT}" y="{TOP}" width="{WIDTH - LEFT - RIGHT}" height="{bottom - TOP}" '
+            'fill="none" stroke="#222"/>',
             f'<text x="{(LEFT + WIDTH - RIGHT) / 2:.0f}" y="{HEIGHT - 8}" text-anchor="middle">time, s</text>',
-            f'<text transform="translate(14 {(TOP + bottom) / 2:.0f}) rotate(-90)" text-anchor="middle">residual, {UNIT}</text>',
-            f'<path d="M{x(onset):.1f},{TOP}V{bottom}M{x(alarm):.1f},{TOP}V{bottom}" stroke="#222" stroke-dasharray="4 3"/>',
+            f'<text transform="translate(14 {(TOP + bottom) / 2:.0f}) rotate(-90)" '
+            f'text-anchor="middle">residual, {UNIT}</text>',
+            f'<path d="M{x(onset):.1f},{TOP}V{bottom}M{x(alarm):.1f},{TOP}V{bottom}" '
+            'stroke="#222" stroke-dasharray="4 3"/>',
             f'<text x="{x(onset) - 5:.1f}" y="{TOP + 16}" text-anchor="end">fault sets in, {onset:g} s</text>',
             f'<text x="{x(alarm) + 5:.1f}" y="{bottom - 8}">first alarm, {alarm:.2f} s</text>']
     at = LEFT
     for look, text, room in (('stroke="#b3261e" stroke-width="2"', "residual", 90),
-                             ('stroke="#cfe3f5" stroke-width="12"', "thresholds [l(t), u(t)]: no healthy robot leaves them", 390),
+                             ('stroke="#cfe3f5" stroke-width="12"',
+                              "thresholds [l(t), u(t)]: no healthy robot leaves them", 390),
                              ('stroke="#fde4df" stroke-width="12"', "fault event", 0)):
         out.append(f'<path d="M{at},24h26" {look}/><text x="{at + 32}" y="28">{text}</text>')
         at += room + 32

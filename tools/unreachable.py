@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which functions of the product no command, binding or example reaches, by room, with their lines.
 
-    tools/unreachable.py              builds the product in build-unreachable (minutes, at first), then a table and a list
+    tools/unreachable.py              builds the product in build-unreachable (minutes, at first), then a table and a
+                                      list
     tools/unreachable.py --built      as it is built already
     tools/unreachable.py --names      without a build: names that a header declares and nothing of the product uses
     tools/unreachable.py --self-test
 
-Every function is compiled into a section of its own, not optimised, and the linker keeps what the programs, the examples and
-the Python module lead to. What none of them keeps is unreachable, unless an embedder's example calls it (KEPT) or it is an
-accessor of one line through which a test looks. Functions of a header that nothing instantiates are missing from all that was
-compiled, and types, constants and fields of a header that nothing uses are found by their names. What only unreachable
-functions use is listed with them, but for names: run it again after deleting. Tests and benchmarks reach nothing.
+Every function is compiled into a section of its own, not optimised, and the linker keeps what the programs, the
+examples and the Python module lead to. What none of them keeps is unreachable, unless an embedder's example calls it
+(KEPT) or it is an accessor of one line through which a test looks. Functions of a header that nothing instantiates are
+missing from all that was compiled, and types, constants and fields of a header that nothing uses are found by their
+names. What only unreachable functions use is listed with them, but for names: run it again after deleting. Tests and
+benchmarks reach nothing.
 """
 
 import argparse
@@ -31,7 +33,8 @@ PRODUCT = list(check_layers.MODULES)
 KEPT = ["examples/*.cpp", "tests/consumer/*.cpp", "tools/*.cpp", "docs/use/embedding.md", "docs/use/own_effect.md"]
 SECTIONS = "-O0 -g1 -w -ffunction-sections -fdata-sections"
 OPTIONS = ["-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG=", f"-DCMAKE_CXX_FLAGS={SECTIONS}",
-           "-DCMAKE_EXE_LINKER_FLAGS=-Wl,--gc-sections", "-DCMAKE_MODULE_LINKER_FLAGS=-Wl,--gc-sections,--exclude-libs,ALL",
+           "-DCMAKE_EXE_LINKER_FLAGS=-Wl,--gc-sections",
+           "-DCMAKE_MODULE_LINKER_FLAGS=-Wl,--gc-sections,--exclude-libs,ALL",
            "-DWHEELWRIGHT_TESTS=OFF", "-DWHEELWRIGHT_BENCH=OFF"]
 OTHERS = re.compile(r"_Z(?:NK?|T\w)?(?:S|5Eigen|5ceres|3fmt|8nlohmann|4YAML|8pybind11|3CLI|9__gnu_cxx|5boost)")
 PLACE = re.compile(r"([\w/.-]+\.[ch]pp):(\d+)")
@@ -40,7 +43,8 @@ DECLARED = re.compile(
     r"(?:(?:struct|class|enum(?:\s+class)?|using|concept)\s+(\w+)|[\w:][\w:<>,*&\s]*?[\s*&>](\w+)\s*(?:\(|=|;|\{))")
 FUNCTION = re.compile(r"^\s*(?:\[\[\w+\]\]\s*)?(?:[\w:][\w:<>,*&\s]*?[\s*&>])?(\w+)\(")
 ACCESSOR = re.compile(r"\(\) const (?:noexcept )?(?:override )?\{ return [^;]+; \}")
-NO_NAMES = {"return", "if", "for", "while", "operator", "namespace", "default", "delete", "noexcept", "final", "override",
+NO_NAMES = {"return", "if", "for", "while", "operator", "namespace", "default", "delete", "noexcept", "final",
+            "override",
             "rebind", "const", "requires", "switch", "throw", "sizeof", "main", "int", "double", "bool", "auto", "void"}
 
 
@@ -55,7 +59,8 @@ def build(folder):
 
 
 def functions_in(binary):
-    """Mangled name -> address, libraries' templates aside, of those that only this file's own unit sees, and of the others."""
+    """Mangled name -> address, libraries' templates aside, of those that only this file's own unit sees, and of the
+    others."""
     own, shared = {}, {}
     for line in run("nm", "--defined-only", binary, stdout=subprocess.PIPE).stdout.splitlines():
         address, kind, name = line.split(" ", 2)
@@ -87,7 +92,8 @@ def places(binary, functions):
 def find_unreached(whole, programs):
     """Where functions of `whole` begin that none of the programs holds, with a name of each; and where all begin."""
     own, shared = functions_in(whole)
-    twice = {name for name, addresses in own.items() if len(addresses) > 1 or name in shared}  # a name tells one from all
+    # A name tells one from all.
+    twice = {name for name, addresses in own.items() if len(addresses) > 1 or name in shared}
     names, begun = set(), set()
     for program in programs:
         its_own, its_shared = functions_in(program)
@@ -127,7 +133,8 @@ def extent(lines, number):
         for letter in code[last - 1]:
             opened |= letter == "{"
             depth += (letter in "{(") - (letter in "})")
-        if depth <= 0 and (opened and re.search(r"\}[;,)\s]*$", code[last - 1]) or code[last - 1].rstrip().endswith(";")):
+        if depth <= 0 and (opened and re.search(r"\}[;,)\s]*$", code[last - 1])
+                           or code[last - 1].rstrip().endswith(";")):
             if last >= number:
                 return first, last
             depth, opened = 0, False
@@ -226,7 +233,8 @@ def self_test():
     header = ("#pragma once\nint used(int a);\n/// Doubles.\nint unused(int a);\n"
               "inline int never(int a) {\n  return a;\n}\nstruct Box {\n  int inside = 0;\n  int unread = 0;\n};\n")
     source = ('#include "a.hpp"\nnamespace {\nint helper(int a) {\n  return a + 1;\n}\n}  // namespace\n'
-              "int used(int a) {\n  return a;\n}\n\nint unused(int a) {\n  const auto f = [&](int b) {\n    return b;\n  };\n"
+              "int used(int a) {\n  return a;\n}\n\n"
+              "int unused(int a) {\n  const auto f = [&](int b) {\n    return b;\n  };\n"
               "  return f(helper(a));\n}\n")
     main = '#include "core/a.hpp"\nint main() {\n  Box b;\n  return used(b.inside);\n}\n'
     with tempfile.TemporaryDirectory() as scratch:

@@ -248,7 +248,8 @@ static inline double pfx_value(const pfx_cascade *c)
 )";
 
 const std::string_view kFade =
-    R"(/* Numbers that only fade end as denormal ones, for ever, which take a processor many times as long: of `size` bytes of
+    "/* Numbers that only fade end as denormal ones, for ever, which take a processor many times as long: of `size` "
+    R"(bytes of
  * doubles, what is far below all rounding is taken for 0. */
 static inline void pfx_fade(void *doubles, size_t size)
 {

@@ -23,7 +23,8 @@ suppress_warnings = ["myst.header"]
 highlight_language = "none"
 
 html_theme = "alabaster"
-html_theme_options = {"description": "Fault detection for wheeled robots with thresholds that are derived, not tuned", "page_width": "1240px",
+html_theme_options = {"description": "Fault detection for wheeled robots with thresholds that are derived, not tuned",
+                      "page_width": "1240px",
                       "sidebar_width": "260px", "font_family": "sans-serif", "fixed_sidebar": True}
 html_sidebars = {"**": ["about.html", "navigation.html", "searchbox.html"]}
 html_static_path = ["static"]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Results as tables: for a notebook (html), for pandas (frame), in one line (line). The compiled part calls these three."""
+"""Results as tables: for a notebook (html), for pandas (frame), in one line (line). The compiled part calls these
+three."""
 
 import html as markup
 import math
@@ -115,7 +116,8 @@ def _margins(m: core.Margins) -> Shown:
     def rows() -> Iterable[Row]:
         for residual, f in _margin_rows(m):
             s = f.summarise(window)
-            yield Row(f"{f.fault} {'+' if f.side > 0 else '−'} ({residual})", s["median"], (s["best"], s["worst"]), f.unit,
+            yield Row(f"{f.fault} {'+' if f.side > 0 else '−'} ({residual})", s["median"], (s["best"], s["worst"]),
+                      f.unit,
                       f"certain at {s['certain']} of {s['onsets']} onsets")
 
     return Shown(f"over {m.seconds:.5g} s, within {m.windows[window]:.5g} s", rows())
@@ -214,7 +216,8 @@ def _regression_frame(r: core.Regression) -> _Columns:
 
 
 def _doctor(h: core.LogHealth) -> Shown:
-    rows = (Row(f["id"], f["value"], None, f["unit"], f"{f['severity']}: {f['sentence']} {f['next']}") for f in h.findings)
+    rows = (Row(f["id"], f["value"], None, f["unit"], f"{f['severity']}: {f['sentence']} {f['next']}")
+            for f in h.findings)
     return Shown(h.sentence, rows)
 
 
@@ -233,7 +236,8 @@ def _choice(c: core.DetectorChoice) -> Shown:
 
 
 def _choice_frame(c: core.DetectorChoice) -> _Columns:
-    rows = ([a["filter"]["order"], a["filter"]["alpha"], a["filter"]["beta"], a["persistence"]["k"], a["persistence"]["n"],
+    rows = ([a["filter"]["order"], a["filter"]["alpha"], a["filter"]["beta"], a["persistence"]["k"],
+             a["persistence"]["n"],
              a["guarantee"], a["warrant"], a["size"], a["delay"], a["size_at_risk"], a["origin"], a["failure"],
              k == 0 and c.chosen is not None] for k, a in enumerate(c.candidates))
     return _columns("order alpha beta k n guarantee warrant size delay size_at_risk origin failure chosen", rows)
@@ -265,7 +269,8 @@ def _comparison(c: core.ModelComparison) -> Shown:
 def _comparison_frame(c: core.ModelComparison) -> _Columns:
     rows = ([s["of"], s["risk"], p["quantity"], p["unit"], *p["before"], *p["after"], *p["change"], p["certain"]]
             for s, p in _comparison_rows(c))
-    return _columns("of risk quantity unit before_lower before_upper after_lower after_upper change_lower change_upper certain",
+    return _columns("of risk quantity unit before_lower before_upper after_lower after_upper change_lower change_upper "
+                    "certain",
                     rows)
 
 
@@ -329,7 +334,8 @@ def _robot_file(r: core.RobotFile) -> Shown:
 
 
 def _robot_file_frame(r: core.RobotFile) -> _Columns:
-    return _columns("key value origin", ([key, value, r.origins.get(key, "")] for key, value in _flat(r.robot.to_dict())))
+    return _columns("key value origin",
+                    ([key, value, r.origins.get(key, "")] for key, value in _flat(r.robot.to_dict())))
 
 
 _SHOWN: dict[type, Callable[[Any], Shown]] = {
@@ -372,7 +378,8 @@ def html(result: Any) -> str:
         interval = "" if row.interval is None else f"[{_number(row.interval[0])}, {_number(row.interval[1])}]"
         value = "" if row.value is None and row.interval is None else _number(row.value)
         cells = (row.what, value, interval, "" if row.unit == "1" else row.unit, row.verdict)
-        text += ["<tr>", *(f'<td style="text-align: left">{markup.escape(_plain(cell))}</td>' for cell in cells), "</tr>"]
+        text += ["<tr>", *(f'<td style="text-align: left">{markup.escape(_plain(cell))}</td>' for cell in cells),
+                 "</tr>"]
     if len(rows) > MOST_ROWS:
         text.append(f'<tr><td colspan="{len(Row._fields)}">… and {len(rows) - MOST_ROWS} more</td></tr>')
     return "".join([*text, "</tbody></table>"])

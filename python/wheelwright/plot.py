@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of results with matplotlib, which is imported when the first one is drawn.
 
-Each function draws into `ax` (by default a new figure's) and returns it. Lines differ in dashes, points in their shape and
-areas in hatching, so that pictures say the same without colour.
+Each function draws into `ax` (by default a new figure's) and returns it. Lines differ in dashes, points in their shape
+and areas in hatching, so that pictures say the same without colour.
 """
 
 import math
@@ -42,7 +42,8 @@ def _number_of(names: list[str], wanted: Union[int, str], what: str) -> int:
 
 
 def parameters(result: Commission, ax: Axes = None) -> Axes:
-    """Bounds and best guess of each parameter, relative to the best guess (to the set's centre where the log shows none).
+    """Bounds and best guess of each parameter, relative to the best guess (to the set's centre where the log shows
+    none).
 
     A bound that is the prior's, and not the log's, is an open circle.
     """
@@ -68,7 +69,8 @@ def residuals(run: DetectorRun, output: Union[int, str] = 0, ax: Axes = None) ->
     """Residual of one output against its threshold; crosses where it is outside, a dashed line at each alarm."""
     i = _number_of(run.outputs, output, "output")
     ax = _axes(ax)
-    ax.fill_between(run.t, run.lower[:, i], run.upper[:, i], facecolor="0.9", edgecolor="0.6", hatch="///", linewidth=0.5,
+    ax.fill_between(run.t, run.lower[:, i], run.upper[:, i], facecolor="0.9", edgecolor="0.6", hatch="///",
+                    linewidth=0.5,
                     label="threshold")
     ax.plot(run.t, run.residual[:, i], "k-", linewidth=0.8, label="residual")
     outside = run.outside[:, i]
@@ -103,7 +105,8 @@ def _outline(result: Union[Commission, Model], i: int, j: int) -> NDArray[np.flo
     reach = np.array([found.support(d) for d in directions])
     plane = directions[:, [i, j]]
     pairs = np.stack([plane, np.roll(plane, -1, axis=0)], axis=1)
-    corners: NDArray[np.float64] = np.linalg.solve(pairs, np.stack([reach, np.roll(reach, -1)], axis=1)[..., None])[..., 0]
+    corners: NDArray[np.float64] = np.linalg.solve(pairs,
+                                                   np.stack([reach, np.roll(reach, -1)], axis=1)[..., None])[..., 0]
     return corners
 
 
@@ -157,7 +160,8 @@ def margins(result: Margins, window: Union[int, None] = None, ax: Axes = None) -
     picture = ax.imshow(share, cmap="Greys", vmin=0.0, vmax=1.0, aspect="auto")
     ax.figure.colorbar(picture, ax=ax, label="share of onsets with a certain size")
     ax.set_xticks(range(len(kinds)), kinds, rotation=30, ha="right")
-    ax.set_yticks(range(len(faults)), [_with_unit(f"{fault.fault} {'+' if fault.side > 0 else '−'} ({name})", fault.unit)
+    ax.set_yticks(range(len(faults)),
+                  [_with_unit(f"{fault.fault} {'+' if fault.side > 0 else '−'} ({name})", fault.unit)
                                        for name, fault in faults])
     ax.set(xlabel="manoeuvre", ylabel="fault, unit of its size",
            title=f"Smallest certain size within {result.windows[window]:.3g} s")
@@ -165,7 +169,8 @@ def margins(result: Margins, window: Union[int, None] = None, ax: Axes = None) -
 
 
 def gap(diagnosis: Diagnosis, channel: Union[int, str] = 0, ax: Axes = None) -> Axes:
-    """Residual of one channel before (solid grey) and after the causes are in the model (dashed), and the noise floor."""
+    """Residual of one channel before (solid grey) and after the causes are in the model (dashed), and the noise
+    floor."""
     i = _number_of([s.channel for s in diagnosis.series], channel, "channel")
     series = diagnosis.series[i]
     ax = _axes(ax)

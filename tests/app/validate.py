@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""validate.py SCHEMA FILE: whether a JSON file fits a schema of results/ (draft 7); schemas beside it may be referred to."""
+"""validate.py SCHEMA FILE: whether a JSON file fits a schema of results/ (draft 7); schemas beside it may be referred
+to."""
 import json
 import pathlib
 import sys

@@ -5,9 +5,9 @@
     calibrate_gap.py ANSWERS.json RESULTS [ANSWERS.json RESULTS]...    a pair for each world; RESULTS has CASE/gap.json
     calibrate_gap.py --judge ANSWERS.json RESULTS [...]                what gap.json promises, against truth
 
-The first counts diagnoses by verdict and number of causes (the table of gap/causes/confidence.cpp) and judges each world by the
-others: what the rest promises for its answers, and what came of it. Names are exact; a payload with the shift of the centre
-that it makes is a payload off the middle.
+The first counts diagnoses by verdict and number of causes (the table of gap/causes/confidence.cpp) and judges each world by
+the others: what the rest promises for its answers, and what came of it. Names are exact; a payload with the shift of
+the centre that it makes is a payload off the middle.
 """
 
 import json
@@ -89,7 +89,8 @@ def count(pairs, out):
     for records in worlds.values():
         for name, record in records.items():
             total[name] = total[name].merged(record)
-    print("| answer | logs | first | another listed | none listed | causes named | there |\n|---|---|---|---|---|---|---|",
+    print("| answer | logs | first | another listed | none listed | causes named | there |\n"
+          "|---|---|---|---|---|---|---|",
           file=out)
     for name, record in sorted(total.items()):
         print(f"| {name} | {record.logs()} | {record.of['first']} | {record.of['other']} | {record.of['neither']} "
@@ -133,7 +134,8 @@ def judge(pairs, out):
             if cause.get("probability") is not None:
                 bins["causes of the verdict"][min(int(10 * cause["probability"]), 9)].append(
                     (cause["probability"], cause["effect"] in truth))
-    print("| world | logs | first: promised | came | listed at all: promised | came |\n|---|---|---|---|---|---|", file=out)
+    print("| world | logs | first: promised | came | listed at all: promised | came |\n|---|---|---|---|---|---|",
+          file=out)
     for world, values in worlds.items():
         first, listed, first_came, listed_came = (sum(column) for column in zip(*values))
         print(f"| {world} | {len(values)} | {first:.1f} | {first_came} | {listed:.1f} | {listed_came} |", file=out)

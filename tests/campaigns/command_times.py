@@ -31,7 +31,8 @@ COMMANDS = [
     ("margins", "margins other.csv --model commission/model.json --out margins"),
     ("choose", "choose log.csv --robot robot.yaml --out choose"),
     ("gap", "gap faulty.csv --robot robot.yaml --baseline log.csv --out gap"),
-    ("design", "design --robot designed.yaml --for bounds --duration 20 --speed 8 --acceleration 20 --radius 1.5 --out design"),
+    ("design",
+     "design --robot designed.yaml --for bounds --duration 20 --speed 8 --acceleration 20 --radius 1.5 --out design"),
     ("export", "export commission/model.json --language c --out export"),
     ("try", "try log.csv --out try"),
 ]
@@ -43,7 +44,8 @@ def make(folder, program, rate, duration=120):
                           "position: {bound: 0.002, bias: 0.0001}, heading: {bound: 0.003, bias: 0.0001}")
     (folder / "robot.yaml").write_text(robot, encoding="utf-8")
     (folder / "designed.yaml").write_text(robot + "limits: {effort: 3.0}\n", encoding="utf-8")
-    scenario = (ROOT / "examples/scenarios/healthy.yaml").read_text(encoding="utf-8").replace("../robot.yaml", "robot.yaml")
+    scenario = (ROOT / "examples/scenarios/healthy.yaml").read_text(encoding="utf-8")
+    scenario = scenario.replace("../robot.yaml", "robot.yaml")
     scenario = scenario.replace("duration: 60", f"duration: {duration:g}").replace("rate: 100", f"rate: {rate}")
     fault = "faults:\n  - {kind: wheel_radius_right, magnitude: -0.005, onset: 40}\n"
     for name, text in (("log", scenario), ("other", scenario.replace("seed: 2", "seed: 3")),
@@ -83,7 +85,8 @@ def main():
             for name, command in COMMANDS:
                 table[name].append(measure(program, command, folder, runs))
                 print(f"{rate} Hz: {name}", file=sys.stderr)
-    print("| command | " + " | ".join(f"{rate} Hz" for rate in RATES) + " | memory |\n|---|" + "---|" * (len(RATES) + 1))
+    print("| command | " + " | ".join(f"{rate} Hz" for rate in RATES) + " | memory |\n|---|"
+          + "---|" * (len(RATES) + 1))
     for name, cells in table.items():
         print(f"| {name} | " + " | ".join(f"{took:.1f} s ({busy:.1f} s)" for took, busy, _ in cells)
               + f" | {max(memory for *_, memory in cells):.0f} MB |")

@@ -4,10 +4,10 @@
 
     tests/campaigns/endurance.py BUILD [HOURS]
 
-Simulates and commissions a robot at 1 kHz, then plays a second drive of two minutes for so many hours of its clock (24 by
-default), with trouble every hour (tests/benchmarks/endurance.cpp says which). Prints decisions that differ from those of the first two
-minutes, latencies, and the memory of `--follow` at the end of every hour. Ends with 1 where a decision differs, memory grows
-from the second hour on, a fault is told, or a spell of trouble is not. Takes some ten minutes.
+Simulates and commissions a robot at 1 kHz, then plays a second drive of two minutes for so many hours of its clock (24
+by default), with trouble every hour (tests/benchmarks/endurance.cpp says which). Prints decisions that differ from those of the
+first two minutes, latencies, and the memory of `--follow` at the end of every hour. Ends with 1 where a decision
+differs, memory grows from the second hour on, a fault is told, or a spell of trouble is not. Takes some ten minutes.
 """
 
 import importlib.util

@@ -4,20 +4,22 @@
 
     tests/campaigns/faults.py [--program build/bin/wheelwright] [--runs 2000] [--seed 1] [--fault WORD] [--command WORD]
 
-Runs commands on short logs, in an empty place or where an earlier result stands, kills, starves or deafens them, then runs
-each again undisturbed, and prints a table (Markdown). The oracle is the bytes that an undisturbed run writes. By fault:
+Runs commands on short logs, in an empty place or where an earlier result stands, kills, starves or deafens them, then
+runs each again undisturbed, and prints a table (Markdown). The oracle is the bytes that an undisturbed run writes. By
+fault:
 
     injected     runs that met the fault
     lost         the exit code is that of the undisturbed run, and a file or what it prints is not
-    half         a file is neither the earlier one nor the new one; a result (its JSON) stands beside files that are not its
-                 own; some files of a result are new and others not, though the run was not stopped between renames
-    left behind  a temporary file, a copy or an empty directory: at once, or, where the run was killed, after the next; or
-                 that the next run is refused, or writes something else
-    wrong exit   neither the undisturbed run's code, nor 2 with a message, nor 128 + the signal that was sent: a crash, an
-                 abort, a failure that says nothing, a run that does not end
+    half         a file is neither the earlier one nor the new one; a result (its JSON) stands beside files that are not
+                 its own; some files of a result are new and others not, though the run was not stopped between renames
+    left behind  a temporary file, a copy or an empty directory: at once, or, where the run was killed, after the next;
+                 or that the next run is refused, or writes something else
+    wrong exit   neither the undisturbed run's code, nor 2 with a message, nor 128 + the signal that was sent: a crash,
+                 an abort, a failure that says nothing, a run that does not end
 
-Ends with 1 where anything but the first is not 0, and tells how each was met. A full disk is a small file system in memory:
-as root only. Kills at calls take build/bin/librecorded_calls.so (the target recorded_calls). What is random is drawn from
+Ends with 1 where anything but the first is not 0, and tells how each was met. A full disk is a small file system in
+memory: as root only. Kills at calls take build/bin/librecorded_calls.so (the target recorded_calls). What is random is
+drawn from
 --seed; when a signal arrives is up to the machine. Takes some five minutes.
 """
 
@@ -388,7 +390,8 @@ def judged(place, whole, fault, began, run):
         if again:
             pass
         elif following.code != usual.code:
-            count("left behind", f"the next run: {following.code}, {following.err.decode(errors='replace').strip()[-300:]}")
+            count("left behind",
+                  f"the next run: {following.code}, {following.err.decode(errors='replace').strip()[-300:]}")
         elif not usual.all_new(after) and not any(TEMPORARY.search(name) for name in after):
             count("left behind", f"after the next run {difference(usual, after)}")
         for name in litter(place.out) + litter(place.folder / "tmp"):
@@ -429,7 +432,8 @@ def make_inputs(program, folder, mass):
     (folder / "drive.yaml").write_text(DRIVE.format(mass=mass), encoding="utf-8")
     (folder / "study.yaml").write_text(STUDY, encoding="utf-8")
     commands = ["simulate drive.yaml --out log.csv", "simulate drive.yaml --seed 7 --out fleet/amy.csv",
-                "simulate drive.yaml --seed 8 --out fleet/bob.csv", "convert log.csv log.mcap", "convert log.csv log.db3",
+                "simulate drive.yaml --seed 8 --out fleet/bob.csv", "convert log.csv log.mcap",
+                "convert log.csv log.db3",
                 "convert log.csv log.h5", "commission log.csv --robot robot.yaml --out model"]
     for command in commands:
         subprocess.run([program, *command.split(), "--quiet"], cwd=folder, check=True, stdout=subprocess.DEVNULL)
@@ -506,7 +510,8 @@ def main():
         make_inputs(program, folder / "new", 21.0)
         make_inputs(program, folder / "earlier", 23.0)
         places = queue.SimpleQueue()
-        places_made = [Place(program, folder / f"place{number}", folder / "new", folder / "earlier") for number in range(asked.jobs)]
+        places_made = [Place(program, folder / f"place{number}", folder / "new", folder / "earlier")
+                       for number in range(asked.jobs)]
         earlier = Place(program, folder / "earlier-place", folder / "earlier", folder / "new")
         wholes = undisturbed(places_made[0], [name for name in COMMANDS if asked.command in name], earlier)
         findings = [whole.differs for whole in wholes if whole.differs]

@@ -77,11 +77,11 @@ interval|core/interval.hpp|s/round_up(x.upper - y.lower)/x.upper - y.lower/
 interval|core/interval.hpp|s/round_down(std::min({a, b, c, d}))/std::min({a, b, c, d})/
 interval|core/interval.hpp|s/round_up(std::max({a, b, c, d}))/std::max({a, b, c, d})/
 interval|core/interval.hpp|s/return round_up(upper - lower)/return upper - lower/
-interval|core/interval.hpp|s/round_up(double x) { return std::nextafter(x, std/round_up(double x) { return 0.0 * x + x; std/;s/x; std.*/x; }/
+interval|core/interval.hpp|s/\(round_up(double x) { return \)std::nextafter(x, std/\10.0 * x + x; std/;s/x; std.*/x; }/
 box|bounds/box.hpp|s/4.0 \* (p + 1.0) \* epsilon \* magnitude/0.0/
 box|bounds/box.hpp|s/2.0 \* p \* std::numeric_limits<double>::min()/0.0/
 bounds|bounds/certificate.cpp|s/return Quad(nearest) < x ? round_up(nearest) : nearest/return nearest/
-bounds|bounds/certificate.cpp|s/const Quad low = rest.lower(), high = rest.upper()/const Quad low = rest.upper() - rest.error(), high = low/
+bounds|bounds/certificate.cpp|s/low = rest.lower(), high = rest.upper()/low = rest.upper() - rest.error(), high = low/
 bounds|bounds/certificate.cpp|s/if (low != 0 || high != 0)/if (false)/
 bounds|bounds/slab_rows.cpp|s/> 0.0 ? round_up(sum) : sum/> 0.0 ? sum : sum/
 bounds|bounds/slab_rows.cpp|s/add_up(half_space.b, round_up(coefficient.width() \* magnitude_\[k\]))/half_space.b/

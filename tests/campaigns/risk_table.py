@@ -90,7 +90,8 @@ def main(arguments):
     within = [5.0, 20.0]
     if len(arguments) < 3 or len(arguments) % 2 == 0:
         sys.exit(__doc__)
-    print("| log | widths | " + " | ".join(f"faults, {w:g} s | only at the risk, only for every noise" for w in within) + " |")
+    print("| log | widths | " + " | ".join(f"faults, {w:g} s | only at the risk, only for every noise" for w in within)
+          + " |")
     print("|" + "---|" * (2 + 2 * len(within)))
     everything = []
     for log, robot in zip(arguments[1::2], arguments[2::2]):

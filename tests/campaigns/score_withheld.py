@@ -5,9 +5,10 @@
     score_withheld.py [--naive|--removed|--profiles] ANSWERS.json RESULTS    RESULTS has CASE/gap.json (or CASE.json)
     score_withheld.py --even|--odd ANSWERS.json RESULTS                      --profiles of cases with such numbers
 
-With --naive what is scored is the answer of the naive rule (`wheelwright gap --naive`), not the diagnosis. With --removed the
-hidden effect was not in the tool's catalogue: whatever is said to explain the log is wrong. --profiles is one table
-with a column for each kind of case (what stands before the _ of its name), and exact names: lag and delay count as two.
+With --naive what is scored is the answer of the naive rule (`wheelwright gap --naive`), not the diagnosis. With
+--removed the hidden effect was not in the tool's catalogue: whatever is said to explain the log is wrong. --profiles is
+one table with a column for each kind of case (what stands before the _ of its name), and exact names: lag and delay
+count as two.
 """
 
 import json
@@ -128,7 +129,8 @@ class Laws:
     def __bool__(self):
         return any(law != "given" for _, law in self.of)
 
-    COLUMNS = ["cases", "in the answer", "single and right", "beside others", "no_gap", "one wrong cause", "unexplained"]
+    COLUMNS = ["cases", "in the answer", "single and right", "beside others", "no_gap", "one wrong cause",
+               "unexplained"]
 
     def report(self, out):
         print("\n| effect | law | " + " | ".join(self.COLUMNS) + " |\n|" + "---|" * (2 + len(self.COLUMNS)), file=out)
@@ -322,7 +324,8 @@ def report_profiles(answers, results, rest=None, out=sys.stdout):
     print(f"| measure | {' | '.join(profiles)} |\n|---|{'---|' * len(profiles)}", file=out)
     for row in ("one effect: in the answer, alone or beside others", "one effect: in the answer, alone",
                 "one effect: alone, and explained", "two effects: exactly these", "two effects: among those said",
-                "no effect: no_gap", "outside the catalogue: unexplained", "blamed on one wrong cause", "a gap called no_gap"):
+                "no effect: no_gap", "outside the catalogue: unexplained", "blamed on one wrong cause",
+                "a gap called no_gap"):
         print(f"| {row} | {' | '.join(str(rows[row][p]) for p in profiles)} |", file=out)
 
 

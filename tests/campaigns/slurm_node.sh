@@ -10,14 +10,18 @@
 # then its jobs are cancelled and the daemons stopped, whatever came of it. Accounting, control groups and limits of
 # memory are off. Run as root, as slurmd asks; a container will do.
 #
-# Exit code: COMMAND's; 77 where Slurm or munge is missing (Debian: apt install slurm-wlm munge); 2 where it does not start.
+# Exit code: COMMAND's; 77 where Slurm or munge is missing (Debian: apt install slurm-wlm munge); 2 where it does not
+# start.
 set -eu
 PATH=$PATH:/usr/sbin:/sbin
 dir=${1:?usage: tests/campaigns/slurm_node.sh DIR COMMAND [ARGUMENT...]}
 shift
 [ $# -gt 0 ] || { echo "slurm node: expected a command" >&2; exit 2; }
 for program in slurmctld slurmd sinfo munged python3; do
-  command -v $program >/dev/null || { echo "slurm node: no $program (Debian: apt install slurm-wlm munge)" >&2; exit 77; }
+  command -v $program >/dev/null || {
+    echo "slurm node: no $program (Debian: apt install slurm-wlm munge)" >&2
+    exit 77
+  }
 done
 [ "$(id -u)" -eq 0 ] || { echo "slurm node: only root may start a node" >&2; exit 77; }
 

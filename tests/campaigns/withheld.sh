@@ -11,7 +11,8 @@
 # the drive that would split ambiguous causes, which takes longer than all the rest.
 #   --laws LAWS     what effects follow (`wheelwright-reality generate --help`); each: a case for every effect and law
 #   --only naive    scores what the naive rule said; results in DIR/results-naive
-#   --only removed  takes the hidden effect (and those that contain it) out of the tool's catalogue, for cases of one effect
+#   --only removed  takes the hidden effect (and those that contain it) out of the tool's catalogue, for cases of one
+#                   effect
 #                   of the catalogue; results in DIR/results-removed
 # Where the set has a second log of each case (fresh/case_*/), what is promised of the shrinking is checked on it.
 # The table is Markdown on standard output. BUILD (default build) is the build directory, JOBS (2) the cases at a time.
@@ -56,7 +57,8 @@ mkdir -p "$results"
 python3 - "$set/answers.json" "$only" >"$results/runs" <<'PY'
 import json, re, sys
 
-ALSO = {"coulomb": ["coulomb_asymmetric"], "armature": ["payload", "payload_offset"], "wheel_radius": ["wheel_radius_asymmetric"],
+ALSO = {"coulomb": ["coulomb_asymmetric"], "armature": ["payload", "payload_offset"], 
+        "wheel_radius": ["wheel_radius_asymmetric"],
         "torque_gain": ["torque_gain_asymmetric"], "viscous": ["viscous_asymmetric"],
         "com_longitudinal": ["payload_offset"], "payload": ["payload_offset"]}
 answers, only = json.load(open(sys.argv[1], encoding="utf-8")), sys.argv[2]
@@ -84,7 +86,8 @@ xargs -P "$jobs" -I '{}' sh -c '
   [ -f "$fresh" ] && set -- "$@" --fresh "$fresh"
   "$bin/wheelwright" gap "$logs/$case/real.csv.gz" --robot "$logs/$case/robot.yaml" \
     --baseline "$logs/$case/baseline.csv.gz" --out "$results/$case" --threads 1 --quiet --no-manoeuvre "$@" \
-    >"$results/$case.log" 2>&1 || [ $? -eq 1 ] || echo "withheld: $case failed, see $results/$case.log" >&2' withheld '{}' \
+    >"$results/$case.log" 2>&1 || [ $? -eq 1 ] ||
+    echo "withheld: $case failed, see $results/$case.log" >&2' withheld '{}' \
   <"$results/runs"
 
 python3 "$root/tests/campaigns/score_withheld.py" ${only:+"--$only"} "$set/answers.json" "$results"

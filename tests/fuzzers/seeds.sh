@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
 #
-# Makes seeds for the fuzzers with our own writers, and for those of text a dictionary: the words in the sources that read it.
+# Makes seeds for the fuzzers with our own writers, and for those of text a dictionary: the words in the sources that
+# read it.
 #
 #   tests/fuzzers/seeds.sh PROGRAM FOLDER     FOLDER/NAME/* for every fuzzer NAME, and FOLDER/NAME.dict
 set -eu
@@ -10,7 +11,8 @@ folder=${2:?usage: tests/fuzzers/seeds.sh PROGRAM FOLDER}
 house=$(realpath "$(dirname "$0")/../..")
 examples=$house/examples
 rm -rf "$folder"
-for name in bag claims columns controllers csv db3 fleet follow gap hdf5 journal mcap messages metadata model packed record \
+for name in bag claims columns controllers csv db3 fleet follow gap hdf5 journal mcap messages metadata model packed \
+  record \
   robot scenario simulator store study urdf; do
   mkdir -p "$folder/$name"
 done
@@ -27,7 +29,8 @@ rate: 50
 EOF
 "$program" simulate drive.yaml --out csv/drive.csv --quiet
 cp drive.yaml scenario/
-sed 's/^robot:.*/robot: {model: differential_drive, wheel_radius: 0.1, track_width: 0.4, effort: {kind: torque, hold: zero_order}}/' \
+robot='{model: differential_drive, wheel_radius: 0.1, track_width: 0.4, effort: {kind: torque, hold: zero_order}}'
+sed "s/^robot:.*/robot: $robot/" \
   drive.yaml > scenario/inline.yaml
 cat >> scenario/inline.yaml <<EOF
 start: {pose: [0, 1, 0.2], error: [0, 0.1, 0]}
@@ -105,7 +108,8 @@ for mode, ending, first in (("WAL", "-wal", b"\0"), ("DELETE", "-journal", b"\1"
 (folder / "open.db3").unlink()
 EOF
 
-# A folder as rosbag2 records it: metadata and, behind a zero byte, a file that is plain or packed, or whose messages are.
+# A folder as rosbag2 records it: metadata and, behind a zero byte, a file that is plain or packed, or whose messages
+# are.
 "$program" convert csv/drive.csv recorded --quiet
 cp recorded/metadata.yaml metadata/
 rm -r recorded
@@ -157,9 +161,11 @@ cp csv/drive.csv.gz csv/drive.csv.zst packed/
   printf 'two' | gzip -c
 } > packed/two.gz
 printf 'plain\n' > packed/plain
-printf 'rosbag2_bagfile_information:\n  message_count: 3\n  relative_file_paths: [a_0.mcap, ../secret.mcap, a_1.mcap]\n' \
+printf '%s\n' 'rosbag2_bagfile_information:' '  message_count: 3' \
+  '  relative_file_paths: [a_0.mcap, ../secret.mcap, a_1.mcap]' \
   > metadata/two.yaml
-printf 'robot,log,when,robot_file,role\na,one.csv,2026-03-01,,commission\na,two.csv,2026-03-02,,check\nb,c.csv,3,r.yaml,\n' \
+printf '%s\n' robot,log,when,robot_file,role a,one.csv,2026-03-01,,commission a,two.csv,2026-03-02,,check \
+  b,c.csv,3,r.yaml, \
   > fleet/list.csv
 cat > controllers/controllers.yaml <<EOF
 controller_manager: {ros__parameters: {update_rate: 50}}
@@ -179,7 +185,8 @@ EOF
 # Definitions, and behind a zero byte messages.
 printf 'float64 x\nint32[] n\nstring name\n\0\0\1\0\0' > messages/plain
 head -c 64 csv/drive.csv >> messages/plain
-printf 'string[] name\nfloat64[] velocity\nInner[2] deep\n===\nMSG: fuzz/Inner\nuint8 LEVEL=3\nwstring<=5 w\nbool[<=3] b\n' \
+printf '%s\n' 'string[] name' 'float64[] velocity' 'Inner[2] deep' === 'MSG: fuzz/Inner' 'uint8 LEVEL=3' \
+  'wstring<=5 w' 'bool[<=3] b' \
   > messages/nested
 
 cp "$examples/robot.yaml" robot/
@@ -200,12 +207,14 @@ name: all
 scenario: scenario.yaml
 inputs: {noise.effort: [0.01, 0.02], prior.mass: {relative: [-0.1, 0.1]}, duration: {range: [0.2, 0.4], nominal: 0.3}}
 window: 2
-methods: {morris: {trajectories: 3, levels: 4}, sobol: {points: 8, replicates: 2, confidence: 0.9}, grid: {levels: {duration: 3}}}
+methods: {morris: {trajectories: 3, levels: 4}, sobol: {points: 8, replicates: 2, confidence: 0.9},
+  grid: {levels: {duration: 3}}}
 seed: 7
 EOF
 cat > urdf/robot.urdf <<EOF
 <robot name="r">
-  <link name="base"><inertial><mass value="9"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="base"><inertial><mass value="9"/>
+  <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
   <link name="right_wheel"><collision><geometry><cylinder radius="0.05" length="0.02"/></geometry></collision></link>
   <joint name="right" type="continuous"><parent link="base"/><child link="right_wheel"/><axis xyz="0 1 0"/>
     <origin xyz="0 -0.2 0" rpy="0 0 0"/><limit effort="2" velocity="9"/><dynamics damping="0.1" friction="0.2"/></joint>
@@ -215,7 +224,8 @@ EOF
 # The same with two wheels; an MJCF with classes and densities; an SDF with poses.
 sed '$d; s/name="r"/name="two"/' urdf/robot.urdf > urdf/two.urdf
 cat >> urdf/two.urdf <<EOF
-  <link name="left_wheel"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  <link name="left_wheel"><inertial><mass value="1"/>
+  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
     <collision><geometry><sphere radius="0.05"/></geometry></collision></link>
   <joint name="left" type="continuous"><parent link="base"/><child link="left_wheel"/><axis xyz="0 1 0"/>
     <origin xyz="0 0.2 0" rpy="0 0 0"/><limit effort="2" velocity="9"/></joint>
@@ -228,17 +238,21 @@ cat > simulator/cart.xml <<EOF
 <worldbody><geom type="plane" size="0 0 1"/><body name="chassis" pos="0 0 0.1"><freejoint/>
 <inertial pos="0.02 0 0.05" quat="0.97 0.26 0 0" mass="12" diaginertia="0.3 0.35 0.4"/><geom type="sphere" size="0.03"/>
 <body name="left" pos="0 0.2 0" euler="-90 0 0" childclass="wheel"><joint name="left"/><geom/></body>
-<body name="right" pos="0 -0.2 0" zaxis="0 1 0"><joint name="right" class="wheel" armature="0.01"/><geom class="wheel"/></body>
+<body name="right" pos="0 -0.2 0" zaxis="0 1 0"><joint name="right" class="wheel" armature="0.01"/>
+<geom class="wheel"/></body>
 </body></worldbody><actuator><motor name="l" joint="left"/><position name="r" joint="right" kp="2" forcerange="-9 9"/>
 </actuator></mujoco>
 EOF
 cat > simulator/cart.sdf <<EOF
 <sdf version="1.8"><model name="cart"><pose>1 2 0 0 0 0</pose><link name="base"><pose>0 0 0.1 0 0 0</pose><inertial>
-<pose>0.02 0 0.05 0 0 0</pose><mass>12</mass><inertia><ixx>0.3</ixx><iyy>0.35</iyy><izz>0.4</izz></inertia></inertial></link>
+<pose>0.02 0 0.05 0 0 0</pose><mass>12</mass>
+<inertia><ixx>0.3</ixx><iyy>0.35</iyy><izz>0.4</izz></inertia></inertial></link>
 <link name="l"><pose>0 0.2 0.1 -1.5708 0 0</pose><collision name="c"><geometry><cylinder><radius>0.1</radius>
-<length>0.04</length></cylinder></geometry></collision></link><link name="r"><pose relative_to="base">0 -0.2 0 -1.5708 0 0</pose>
+<length>0.04</length></cylinder></geometry></collision></link>
+<link name="r"><pose relative_to="base">0 -0.2 0 -1.5708 0 0</pose>
 <inertial><mass>1</mass><inertia><ixx>0.003</ixx><iyy>0.003</iyy><izz>0.005</izz></inertia></inertial></link>
-<joint name="left_joint" type="revolute"><parent>base</parent><child>l</child><axis><xyz>0 0 1</xyz><limit><effort>20</effort>
+<joint name="left_joint" type="revolute"><parent>base</parent><child>l</child>
+<axis><xyz>0 0 1</xyz><limit><effort>20</effort>
 </limit><dynamics><damping>0.02</damping></dynamics></axis></joint><joint name="right_joint" type="revolute">
 <parent>base</parent><child>r</child><axis><xyz expressed_in="__model__">0 1 0</xyz></axis></joint></model></sdf>
 EOF
@@ -292,8 +306,10 @@ printf '{"schema":"wheelwright/model/1","robot":{"name":"a","columns":{"tau_r":"
   > columns/model.json
 cat > gap/gap.json <<EOF
 {"schema": "wheelwright/gap/1", "filter": {"beta": 10}, "shrink": {"torque_rms": {"sum": {"floor": 0.02},
-"difference": {"floor": 0.005}}}, "causes": [{"effect": "coulomb", "parameters": {"coulomb": {"estimate": 0.3, "unit": "N·m"}}}],
-"credible_set": [{"effects": ["coulomb"]}, {"effects": ["delay"], "parameters": {"delay.delay": {"estimate": 0.04, "unit": "s"}}},
+"difference": {"floor": 0.005}}},
+"causes": [{"effect": "coulomb", "parameters": {"coulomb": {"estimate": 0.3, "unit": "N·m"}}}],
+"credible_set": [{"effects": ["coulomb"]},
+{"effects": ["delay"], "parameters": {"delay.delay": {"estimate": 0.04, "unit": "s"}}},
 {"effects": ["coulomb", "mass"]}, {"effects": ["wheel_radius"]}, {"effects": ["stribeck"]}]}
 EOF
 

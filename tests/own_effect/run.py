@@ -21,7 +21,8 @@ PARAMETERS = f"{{mass: {MASS}, yaw_inertia: 0.9, viscous_linear: 4.0, viscous_ya
 def blocks(page):
     """The indented blocks after "For good": the function, the entry."""
     text = page.read_text(encoding="utf-8").split("## For good", 1)[1]
-    found = [re.sub(r"(?m)^    ", "", block) for block in re.findall(r"(?m)((?:^(?:    .*)?\n)+)", text) if block.strip()]
+    found = [re.sub(r"(?m)^    ", "", block) for block in re.findall(r"(?m)((?:^(?:    .*)?\n)+)", text)
+             if block.strip()]
     assert len(found) == 2, f"{page}: two blocks expected, {len(found)} found"
     return found
 
@@ -69,7 +70,8 @@ def program_with(source, build, scratch):
         program = scratch / "wheelwright"
         link = commands[-1]
         assert " -o bin/wheelwright " in link and "model/libwheelwright_model.a" in link, link
-        run(link.replace(" -o bin/wheelwright ", f" -o {program} ").replace("model/libwheelwright_model.a", str(library)),
+        link = link.replace(" -o bin/wheelwright ", f" -o {program} ")
+        run(link.replace("model/libwheelwright_model.a", str(library)),
             build)
         return program
     raise AssertionError("no object of the program holds model/effect_law.cpp")
@@ -88,7 +90,8 @@ def main():
     plain = (arguments.source / "examples/robot.yaml").read_text(encoding="utf-8")
     (scratch / "robot.yaml").write_text(plain, encoding="utf-8")
     for name, c in (("exact", str(C)), ("interval", "[0.1, 1.0]")):
-        (scratch / f"{name}.yaml").write_text(plain + f"effects: [{{effect: curve_resistance, c: {c}}}]\n", encoding="utf-8")
+        (scratch / f"{name}.yaml").write_text(plain + f"effects: [{{effect: curve_resistance, c: {c}}}]\n",
+                                              encoding="utf-8")
     for name, robot, seed in (("healthy", "robot", 5), ("resists", "exact", 6)):
         (scratch / f"{name}_scenario.yaml").write_text(
             f"robot: {robot}.yaml\nparameters: {PARAMETERS}\n"

@@ -22,14 +22,18 @@ PACKAGE = Path(ww.__file__).parent
 
 
 _URDF = """<robot name="cart">
-  <link name="base"><inertial><mass value="10"/><inertia ixx="0.2" iyy="0.3" izz="0.4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="base"><inertial><mass value="10"/>
+    <inertia ixx="0.2" iyy="0.3" izz="0.4" ixy="0" ixz="0" iyz="0"/></inertial></link>
   {}
 </robot>
 """
-_WHEEL = """<link name="{0}"><inertial><mass value="0.5"/><inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/>
-    </inertial><collision><origin rpy="1.5707963267948966 0 0"/><geometry><cylinder radius="0.05" length="0.02"/></geometry>
+_WHEEL = """<link name="{0}"><inertial><mass value="0.5"/>
+    <inertia ixx="1e-3" iyy="1e-3" izz="1e-3" ixy="0" ixz="0" iyz="0"/>
+    </inertial><collision><origin rpy="1.5707963267948966 0 0"/>
+    <geometry><cylinder radius="0.05" length="0.02"/></geometry>
     </collision></link>
-  <joint name="{0}_joint" type="continuous"><parent link="base"/><child link="{0}"/><origin xyz="0 {1} 0"/><axis xyz="0 1 0"/>
+  <joint name="{0}_joint" type="continuous"><parent link="base"/><child link="{0}"/>
+    <origin xyz="0 {1} 0"/><axis xyz="0 1 0"/>
     <limit effort="6" velocity="30"/></joint>"""
 # A cart on two driven wheels, 0.4 m apart.
 CART = _URDF.format(_WHEEL.format("left", 0.2) + _WHEEL.format("right", -0.2))

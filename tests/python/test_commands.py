@@ -39,7 +39,8 @@ class Doctor(Commands):
         of_model = ww.doctor(healthy_log(), commissioned().model)
         self.assertTrue(of_model.fit)
         self.assertEqual(of_model.verdict, "commission")
-        self.assertEqual([f["id"] for f in of_model.findings], [f["id"] for f in ww.doctor(healthy_log(), robot()).findings])
+        self.assertEqual([f["id"] for f in of_model.findings],
+                         [f["id"] for f in ww.doctor(healthy_log(), robot()).findings])
 
     def test_what_cannot_be_commissioned(self):
         columns = healthy_log().to_arrays()
@@ -77,7 +78,8 @@ class Check(Commands):
         from_file = ww.check(model_file(), healthy_log())
         self.assertTrue(from_file.proved)
         self.same(from_file, "check", model_file(), HEALTHY)
-        self.assertIsNone(different(ww.check(ww.read_model(model_file()), healthy_log()).to_dict(), from_file.to_dict()))
+        self.assertIsNone(different(ww.check(ww.read_model(model_file()), healthy_log()).to_dict(),
+                                    from_file.to_dict()))
         in_memory = ww.check(commissioned(), healthy_log()).to_dict()
         self.assertIsNone(different({**in_memory, "model": str(model_file())}, from_file.to_dict()))
 
@@ -221,7 +223,8 @@ class RobotFrom(Commands):
 
     def test_hints_go_before_the_file(self):
         python = ww.robot_from(path("cart.urdf"), wheel_radius=0.0505, track_width=0.41, name="mine")
-        self.same(python, "robot", "--urdf", path("cart.urdf"), "--wheel-radius", 0.0505, "--track-width", 0.41, "--name",
+        self.same(python, "robot", "--urdf", path("cart.urdf"), "--wheel-radius", 0.0505, "--track-width", 0.41,
+                  "--name",
                   "mine")
 
     def test_what_is_missing_is_named(self):
@@ -241,7 +244,8 @@ class Discrimination(Commands):
     def test_causes_by_name(self):
         python = ww.design(ww.read_model(model_file()), "discrimination", between=["coulomb", "caster_drag+slope"],
                            sizes={"coulomb": 0.2}, **self.LIMITS)
-        self.same(python, "design", "--model", model_file(), "--for", "discrimination", "--between", "coulomb", "--between",
+        self.same(python, "design", "--model", model_file(), "--for", "discrimination", "--between", "coulomb",
+                  "--between",
                   "caster_drag+slope", "--size", "coulomb=0.2", *self.OPTIONS)
         self.assertLessEqual({"t", "command_r", "command_l"}, set(python.commands))
 

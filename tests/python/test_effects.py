@@ -124,7 +124,8 @@ class OwnEffects(unittest.TestCase):
     def test_the_catalogue_can_be_read(self):
         effects = ww.effect_catalogue(WORLD)
         self.assertIn("coulomb", [effect.name for effect in effects])
-        laws = [(effect.name, effect.sentence) for effect in effects]  # an effect of several laws is there once for each
+        # An effect of several laws is there once for each.
+        laws = [(effect.name, effect.sentence) for effect in effects]
         self.assertEqual(len(laws), len(set(laws)))
 
 

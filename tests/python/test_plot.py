@@ -49,7 +49,8 @@ class Plot(unittest.TestCase):
         np.testing.assert_array_equal(ax.lines[0].get_ydata(), run.residual[:, i])
         alarms = [e.alarm for e in run.events if e.output == "difference"]
         self.assertEqual([line.get_xdata()[0] for line in ax.lines if line.get_linestyle() == "--"], alarms)
-        self.assertEqual([t.get_text() for t in ax.get_legend().get_texts()], ["threshold", "residual", "outside", "alarm"])
+        self.assertEqual([t.get_text() for t in ax.get_legend().get_texts()],
+                         ["threshold", "residual", "outside", "alarm"])
 
     def test_measured_and_predicted_differ_without_colour(self):
         ax = self.drawn(ww.plot.efforts(self.run_of_fault()), "t, s", "filtered sum, N·m")
@@ -71,7 +72,8 @@ class Plot(unittest.TestCase):
                 self.assertLess((corners @ along).max(), reach + 5e-3)
 
     def test_margins_are_a_matrix(self):
-        found = ww.margins(healthy_log(), commissioned().model, faults=["wheel_radius", "payload_lost"], windows=[0.5, 2.0],
+        found = ww.margins(healthy_log(), commissioned().model, faults=["wheel_radius", "payload_lost"],
+                           windows=[0.5, 2.0],
                            onset_step=2.0)
         ax = self.drawn(ww.plot.margins(found, 1), "manoeuvre", "fault, unit")
         self.assertEqual(ax.get_title(), "Smallest certain size within 2 s")
@@ -82,7 +84,8 @@ class Plot(unittest.TestCase):
         self.assertEqual(ax.texts[0].get_text(), f"{first:.3g}" if np.isfinite(first) else "–")
 
     def test_gap(self):
-        found = ww.gap(ww.read_log(fault_file(), robot()), robot(), baseline=healthy_log(), shrink=False, manoeuvre=False)
+        found = ww.gap(ww.read_log(fault_file(), robot()), robot(), baseline=healthy_log(), shrink=False,
+                       manoeuvre=False)
         series = found.series[1]
         ax = self.drawn(ww.plot.gap(found, series.channel), "t, s", f"residual of {series.channel}")
         np.testing.assert_array_equal(ax.lines[0].get_ydata(), series.nominal)
@@ -99,7 +102,8 @@ class Plot(unittest.TestCase):
         self.assertIs(ww.plot.residuals(self.run_of_fault(), ax=axes[0]), axes[0])
 
     def test_names_are_checked(self):
-        for work, wrong in ((lambda: ww.plot.residuals(self.run_of_fault(), "left"), "output 'left': expected one of sum"),
+        for work, wrong in ((lambda: ww.plot.residuals(self.run_of_fault(), "left"),
+                             "output 'left': expected one of sum"),
                             (lambda: ww.plot.residuals(self.run_of_fault(), 2), "output 2"),
                             (lambda: ww.plot.feasible_set(commissioned(), "r_mass", "r_mass"), "r_mass twice"),
                             (lambda: ww.plot.feasible_set(commissioned(), "mass"), "parameter 'mass'")):

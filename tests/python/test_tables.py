@@ -25,7 +25,8 @@ def results():
     path("study.yaml").write_text(f"scenario: {SCENARIOS / 'healthy.yaml'}\ninputs: {{noise.effort: [0.01, 0.05]}}\n"
                                   "quantities: [width]\nmethods: {one_at_a_time: {levels: 2}}\n")
     path("cart.yaml").write_text("controller_manager: {ros__parameters: {update_rate: 100}}\n"
-                                 "diff_drive_controller:\n  ros__parameters: {left_wheel_names: [l], right_wheel_names: [r], "
+                                 "diff_drive_controller:\n"
+                                 "  ros__parameters: {left_wheel_names: [l], right_wheel_names: [r], "
                                  "wheel_separation: 0.4, wheel_radius: 0.05}\n")
     limits = {"speed": 8.0, "acceleration": 20.0, "radius": 1.5, "stages": 1, "duration": 6.0}
     return [commissioned(), ww.detect(fault, model), ww.Detector(model).run(fault),
@@ -33,7 +34,8 @@ def results():
             ww.gap(fault, robot(), baseline=healthy_log(), shrink=False, manoeuvre=False),
             ww.identify(healthy_log(), robot(), shapes=False), ww.filter_log(healthy_log(), robot(), model),
             ww.doctor(healthy_log(), robot()), ww.choose(healthy_log(), robot(), threads=2),
-            ww.check(commissioned(), healthy_log()), ww.compare(model, model), ww.fleet([HEALTHY, path("there_is_none.csv")], robot()),
+            ww.check(commissioned(), healthy_log()), ww.compare(model, model),
+            ww.fleet([HEALTHY, path("there_is_none.csv")], robot()),
             ww.sensitivity(path("study.yaml")), ww.robot_from(ros2_control=path("cart.yaml")),
             ww.design(model, "bounds", **limits), ww.design(model, "detection", **limits),
             ww.design(model, "discrimination", between=["coulomb", "caster_drag"], **limits)]

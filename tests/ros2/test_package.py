@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The package of examples/ros2 as colcon meets it, with packages that stand in for those of ROS 2: it is configured, built and
-installed against the installed Wheelwright, and its files agree with each other.
+"""The package of examples/ros2 as colcon meets it, with packages that stand in for those of ROS 2: it is configured,
+built and installed against the installed Wheelwright, and its files agree with each other.
 
     test_package.py BUILD COMPILER FLAGS    the build tree of Wheelwright, the compiler and its flags there
 """
@@ -67,7 +67,8 @@ class Package(unittest.TestCase):
                 f"-DCMAKE_INSTALL_PREFIX={folder / 'installed'}")
             run("cmake", "--build", folder / "build")
             run("cmake", "--install", folder / "build")
-            installed = {str(path.relative_to(folder / "installed")) for path in (folder / "installed").rglob("*") if path.is_file()}
+            installed = {str(path.relative_to(folder / "installed")) for path in (folder / "installed").rglob("*")
+                         if path.is_file()}
         share = "share/wheelwright_diagnostics/"
         self.assertEqual(installed, {"lib/wheelwright_diagnostics/wheelwright_diagnostics",
                                      share + "config/wheelwright_diagnostics.yaml",

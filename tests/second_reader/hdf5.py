@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """HDF5 by hand, without its library: enough for what `convert` writes and for the plainest file of doubles.
 
-From the "HDF5 File Format Specification", version 3.0: superblock of version 0 (II.A), groups of version 1 (III.A to D),
-object headers of version 1 (IV.A.1.a), dataspaces, doubles, attributes, layouts of version 3, chunks that are
+From the "HDF5 File Format Specification", version 3.0: superblock of version 0 (II.A), groups of version 1 (III.A to
+D), object headers of version 1 (IV.A.1.a), dataspaces, doubles, attributes, layouts of version 3, chunks that are
 shuffled and deflated.
 """
 
@@ -14,7 +14,8 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # IEEE 754, 64 bits, little-endian (IV.A.2.d): class 1 of version 1, what its bits are, 8 bytes.
 DOUBLE = bytes([0x11, 0x20, 0x3F, 0x00]) + struct.pack("<IHHBBBBI", 8, 0, 64, 52, 11, 0, 52, 1023)
 LAYOUT, TYPE, SPACE, FILTERS, ATTRIBUTE, CONTINUED, SYMBOLS = 0x08, 0x03, 0x01, 0x0B, 0x0C, 0x10, 0x11
-UNITS = {"t": b"s", "phi_r": b"rad", "phi_l": b"rad", "omega_r": b"rad/s", "omega_l": b"rad/s", "tau_r": b"N\xc2\xb7m", "tau_l": b"N\xc2\xb7m"}
+UNITS = {"t": b"s", "phi_r": b"rad", "phi_l": b"rad", "omega_r": b"rad/s", "omega_l": b"rad/s", "tau_r": b"N\xc2\xb7m",
+         "tau_l": b"N\xc2\xb7m"}
 
 
 class Unreadable(Exception):
@@ -24,7 +25,8 @@ class Unreadable(Exception):
 class File:
     def __init__(self, data):
         self.data = data
-        if data[:8] != SIGNATURE or self.at("<B", 8)[0] != 0 or self.at("<BB", 13) != (8, 8) or self.at("<Q", 24) != (0,):
+        if (data[:8] != SIGNATURE or self.at("<B", 8)[0] != 0 or self.at("<BB", 13) != (8, 8)
+                or self.at("<Q", 24) != (0,)):
             raise Unreadable
 
     def at(self, form, place):
@@ -188,7 +190,8 @@ def read(path, group=b""):
 
 
 def write(path, columns, piece=0):
-    """Datasets of doubles in the root group, in one piece each or in pieces of so many, without filters and attributes."""
+    """Datasets of doubles in the root group, in one piece each or in pieces of so many, without filters and
+    attributes."""
     data = bytearray(96)  # the superblock, written last
 
     def put(content):
@@ -213,7 +216,8 @@ def write(path, columns, piece=0):
                 keys += struct.pack("<IIQQQ", 8 * piece, 0, first, 0, put(struct.pack(f"<{piece}d", *part)))
             count = -(-len(values) // piece)
             keys += struct.pack("<IIQQ", 0, 0, count * piece, 8)
-            tree = put((struct.pack("<4sBBHQQ", b"TREE", 1, 0, count, NONE, NONE) + keys).ljust(24 + 32 * 64 + 24, b"\0"))
+            head = struct.pack("<4sBBHQQ", b"TREE", 1, 0, count, NONE, NONE)
+            tree = put((head + keys).ljust(24 + 32 * 64 + 24, b"\0"))
             layout = struct.pack("<BBBQII", 3, 2, 2, tree, piece, 8)
         else:
             layout = struct.pack("<BBQQ", 3, 1, put(struct.pack(f"<{len(values)}d", *values)), 8 * len(values))
@@ -225,7 +229,8 @@ def write(path, columns, piece=0):
     node = put((struct.pack("<4sBxH", b"SNOD", 1, len(names)) + symbols).ljust(8 + 40 * 8, b"\0"))  # 2 × leaf K of 4
     heap = put(struct.pack("<4sBxxxQQQ", b"HEAP", 0, len(text), 1, len(data) + 32) + text)
     keys = struct.pack("<QQQ", 0, node, offsets[-1])
-    tree = put((struct.pack("<4sBBHQQ", b"TREE", 0, 0, 1, NONE, NONE) + keys).ljust(24 + 8 * 65, b"\0"))  # internal K of 16
+    head = struct.pack("<4sBBHQQ", b"TREE", 0, 0, 1, NONE, NONE)
+    tree = put((head + keys).ljust(24 + 8 * 65, b"\0"))  # internal K of 16
     root = header((SYMBOLS, struct.pack("<QQ", tree, heap)))
     data[:96] = (SIGNATURE + bytes([0, 0, 0, 0, 0, 8, 8, 0]) + struct.pack("<HHI", 4, 16, 0)
                  + struct.pack("<QQQQ", 0, NONE, len(data), NONE) + struct.pack("<QQIxxxxQQ", 0, root, 1, tree, heap))

@@ -260,7 +260,8 @@ def write_db3(path, messages, others=()):
         database.execute("INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')", (number, topic, kind))
     for stamp, data in messages:
         for number, message in (*((number, other[3]) for number, other in enumerate(others, 2)), (1, data)):
-            database.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", (number, stamp, message))
+            database.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)",
+                             (number, stamp, message))
     database.commit()
     database.close()
 
@@ -302,7 +303,8 @@ def key(names, values, said):
     """What values have to be equal; of angles, once it is said that whole turns were undone, without those."""
     turned = "by a whole turn undone" in said
     return tuple(None if not math.isfinite(value)
-                 else round(value % (2 * math.pi) * 1e6) % round(2e6 * math.pi) if turned and name.startswith("phi") else value
+                 else round(value % (2 * math.pi) * 1e6) % round(2e6 * math.pi) if turned and name.startswith("phi")
+                 else value
                  for name, value in zip(names, values))
 
 
@@ -421,7 +423,8 @@ def main():
         reader = {".mcap": mcap, ".db3": db3, ".h5": partial(stored, b"log")}[path.suffix]
         seeds[name] = path, reader, name.endswith("mcap"), SPEEDS
 
-    print(f"seed {seed}, {count} changes each\n{'recording':12} {'refused':>8} {'read':>6} {'whole':>6} {'no judge':>9}")
+    print(f"seed {seed}, {count} changes each\n"
+          f"{'recording':12} {'refused':>8} {'read':>6} {'whole':>6} {'no judge':>9}")
     failures = []
     for name, (path, reader, checked, columns) in seeds.items():
         if wanted and name not in wanted:

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The unit and the image of examples/service: what they name is there, and the unit's shell line does what its README says.
-No container is built, and nothing is started by systemd."""
+"""The unit and the image of examples/service: what they name is there, and the unit's shell line does what its README
+says. No container is built, and nothing is started by systemd."""
 
 import functools
 import json
@@ -70,7 +70,8 @@ def shell_line(name):
 
 
 def run(arguments, **options):
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False, **options)
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120, check=False,
+                          **options)
 
 
 def packages_of(program):
@@ -82,7 +83,8 @@ def packages_of(program):
     found = dict(re.findall(r"^\s*(\S+) => (/\S+)", output("ldd", program), re.M))
     packages = set()
     for library in needed:
-        if library.startswith(("liblapack.", "libblas.", "libasan.", "libubsan.")):  # several packages have it; sanitizers
+        # Several packages have it; sanitizers.
+        if library.startswith(("liblapack.", "libblas.", "libasan.", "libubsan.")):
             continue
         path = os.path.realpath(found[library])
         # dpkg knows /lib by the name it has in the package.
@@ -108,7 +110,8 @@ class Unit(unittest.TestCase):
         known = run(["detect", "--help"]).stdout
         self.assertRegex(known, r"Exit code: 0 no fault, 1 a fault was found, 2 bad input")
         self.assertEqual(values("Service", "SuccessExitStatus"), ["1 143"])
-        self.assertNotIn("2", values("Service", "RestartPreventExitStatus")[0].split(), "a stream that ended blind ends with it")
+        self.assertNotIn("2", values("Service", "RestartPreventExitStatus")[0].split(),
+                         "a stream that ended blind ends with it")
 
     def test_reader_knows_a_bad_line(self):
         self.assertEqual(read_unit("[A]\nB=1\nB=2\n# c\n"), {"A": [("B", "1"), ("B", "2")]})
@@ -123,7 +126,8 @@ class ShellLine(unittest.TestCase):
         cls.holder = tempfile.TemporaryDirectory()
         cls.folder = Path(cls.holder.name)
         cls.settings = cls.folder / "etc" / "wheelwright" / "r1"
-        done = run(["commission", SOURCE / "examples/healthy.csv.gz", "--robot", SOURCE / "examples/robot.yaml", "--out",
+        done = run(["commission", SOURCE / "examples/healthy.csv.gz", "--robot", SOURCE / "examples/robot.yaml",
+                    "--out",
                     cls.settings, "--quiet"])
         assert done.returncode == 0, done.stderr
         for drive in ("healthy", "fault"):

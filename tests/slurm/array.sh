@@ -14,7 +14,8 @@ if [ "$#" -eq 3 ]; then
   rm -rf "$3"
   mkdir -p "$3"
   cd "$3"
-  exec "$here/../../tests/campaigns/slurm_node.sh" slurm "$here/array.sh" inside "$program" "$make_fleet" "$here/../../tools/slurm"
+  exec "$here/../../tests/campaigns/slurm_node.sh" slurm "$here/array.sh" inside "$program" "$make_fleet" \
+    "$here/../../tools/slurm"
 fi
 
 # From here on beside a Slurm, in SCRATCH.
@@ -40,7 +41,8 @@ WAIT=1 "$jobs/submit.sh" 3 "$@" array || fail "the merge ended with $?"
 same array
 
 # Two of three shards: the merge tells which is missing, and writes no result.
-sbatch --quiet --wait --export=ALL,SHARDS=3 --array=1,3 "$jobs/fleet_array.sbatch" "$@" lost || fail "shards 1 and 3: $?"
+sbatch --quiet --wait --export=ALL,SHARDS=3 --array=1,3 "$jobs/fleet_array.sbatch" "$@" lost ||
+  fail "shards 1 and 3: $?"
 status=0
 sbatch --quiet --wait --output=merge.out "$jobs/fleet_merge.sbatch" "$@" lost || status=$?
 [ "$status" -eq 2 ] || fail "a merge with a shard missing ended with $status, not 2"

@@ -42,7 +42,8 @@ endif()
 set(papers ${CMAKE_BINARY_DIR}/debian)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC)
-file(WRITE ${papers}/changelog.Debian "wheelwright (${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}) unstable; urgency=medium
+file(WRITE ${papers}/changelog.Debian
+  "wheelwright (${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}) unstable; urgency=medium
 
   * Made from the sources by CPack; changelog.gz tells what changed there.
 

@@ -5,10 +5,10 @@
 #
 #   tools/slurm/submit.sh N LIST --robot robot.yaml --out OUT
 #
-# N is the number of shards; the rest are the arguments of `wheelwright fleet`. Prints the numbers of both jobs; the merge
-# begins when all shards have ended. Environment: SBATCH_OPTIONS for both jobs (partition, account, time, memory; words
-# parted by spaces), WAIT=1 to come back when the merge has ended, with its exit code, WHEELWRIGHT for a program that is
-# not in PATH.
+# N is the number of shards; the rest are the arguments of `wheelwright fleet`. Prints the numbers of both jobs; the
+# merge begins when all shards have ended. Environment: SBATCH_OPTIONS for both jobs (partition, account, time, memory;
+# words parted by spaces), WAIT=1 to come back when the merge has ended, with its exit code, WHEELWRIGHT for a program
+# that is not in PATH.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 case ${1:-} in
@@ -24,7 +24,8 @@ array=$(sbatch --parsable ${SBATCH_OPTIONS:-} --array="1-$shards" "$here/fleet_a
 array=${array%%;*}
 echo "shards: $array"
 # shellcheck disable=SC2086
-merge=$(sbatch --parsable ${SBATCH_OPTIONS:-} --dependency="afterany:$array" ${WAIT:+--wait} "$here/fleet_merge.sbatch" "$@") ||
+merge=$(sbatch --parsable ${SBATCH_OPTIONS:-} --dependency="afterany:$array" ${WAIT:+--wait} \
+  "$here/fleet_merge.sbatch" "$@") ||
   status=$?
 echo "merge: ${merge%%;*}"
 exit "$status"
