@@ -6,14 +6,18 @@
     tools/freeze.py --program build/bin/wheelwright --against before.json   # ends with 1 where a result differs
     tools/freeze.py --program build/bin/wheelwright --quick --against tools/behaviour.json   # what CI runs
     tools/freeze.py --program build/bin/wheelwright --against before.json --keep now         # and leave the results
+    tools/freeze.py --program build/bin/wheelwright --against before.json --threads 1        # results of one thread
     tools/freeze.py --numbers before now   # two such folders: the largest relative difference of any number in a file
 
-Every run gets an exit code, a hash of what it prints with --json or to the standard output, and one of each JSON file,
-CSV file, header and robot file that it writes; of pages and plain words only with --words. JSON is hashed without the
-name of the software. The C library is asked for the same mathematical functions on every machine (GLIBC_TUNABLES).
+Runs stand in tools/freeze_runs.py. Every run gets an exit code, a hash of what it prints as a result, and one of each
+JSON file, CSV file, header, robot file and simulator's file that it writes; of pages and plain words only with --words.
+Recordings in binary formats are compared by what they are when converted back. What may differ from run to run is
+taken out in comparable(). Results must not depend on --threads. The C library is asked for the same mathematical
+functions on every machine (GLIBC_TUNABLES). Python's results are there where the module is built beside the program.
 """
 import argparse
 import concurrent.futures
+import csv
 import hashlib
 import json
 import os
@@ -22,87 +26,14 @@ import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-SHARED = ROOT.parent / "shared"
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+from freeze_runs import INPUTS, ROOT, SHARED, all_runs, recorded_runs  # noqa: E402
+
 VOLATILE = {"software"}
-HASHED = {".json", ".csv", ".h", ".yaml", ".jsonl"}
-WORDS = {".html", ".txt", ".md"}
-
-HEALTHY = str(ROOT / "examples/healthy.csv.gz")
-ROBOT = str(ROOT / "examples/robot.yaml")
-STUDY = str(ROOT / "examples/studies/better_sensor.yaml")
-LIMITS = ["--speed", "8", "--acceleration", "20", "--radius", "1.5", "--duration", "10"]
-
-
-def scenario(name):
-    return str(ROOT / "examples/scenarios" / f"{name}.yaml")
-
-
-class Run:
-    """One call of the program in a folder of its own; `needs` are the runs whose files it reads as ../NAME/FILE."""
-
-    def __init__(self, name, words, needs=(), quick=False):
-        self.name, self.words, self.needs, self.quick = name, words, tuple(needs), quick
-
-
-def shipped_runs():
-    model = "../commission/r/model.json"
-    yield Run("simulate_healthy", ["simulate", scenario("healthy"), "--out", "log.csv"], quick=True)
-    yield Run("simulate_fault", ["simulate", scenario("fault"), "--out", "log.csv"], quick=True)
-    yield Run("simulate_slip", ["simulate", scenario("slip"), "--out", "log.csv"])
-    yield Run("simulate_pose", ["simulate", scenario("commissioning"), "--out", "log.csv"], quick=True)
-    yield Run("commission", ["commission", HEALTHY, "--robot", ROBOT, "--out", "r"], quick=True)
-    yield Run("commission_pose", ["commission", "../simulate_pose/log.csv", "--robot", ROBOT, "--out", "r"],
-              ["simulate_pose"], quick=True)
-    yield Run("doctor", ["doctor", HEALTHY, "--robot", ROBOT, "--out", "r"], quick=True)
-    yield Run("identify", ["identify", HEALTHY, "--robot", ROBOT, "--out", "r"], quick=True)
-    yield Run("check", ["check", model, HEALTHY, "--json"], ["commission"])
-    yield Run("detect_healthy", ["detect", "../simulate_healthy/log.csv", "--model", model, "--out", "r"],
-              ["commission", "simulate_healthy"], quick=True)
-    yield Run("detect_fault", ["detect", "../simulate_fault/log.csv", "--model", model, "--out", "r"],
-              ["commission", "simulate_fault"])
-    yield Run("detect_slip", ["detect", "../simulate_slip/log.csv", "--model", "../commission_pose/r/model.json",
-                              "--out", "r"], ["commission_pose", "simulate_slip"])
-    yield Run("margins", ["margins", HEALTHY, "--model", model, "--fault", "wheel_radius", "--fault",
-                          "effort_loss_right", "--out", "r"], ["commission"])
-    yield Run("margins_all", ["margins", "../simulate_pose/log.csv", "--model", "../commission_pose/r/model.json",
-                              "--out", "r"], ["simulate_pose", "commission_pose"])
-    yield Run("export", ["export", model, "--language", "c", "--out", "r"], ["commission"], quick=True)
-    yield Run("export_box", ["export", model, "--language", "c", "--set", "box", "--out", "r"], ["commission"],
-              quick=True)
-    yield Run("design_bounds", ["design", "--model", model, "--for", "bounds", *LIMITS, "--out", "r"], ["commission"])
-    yield Run("design_detection", ["design", "--model", model, "--for", "detection", "--fault", "wheel_radius=0.03",
-                                   *LIMITS, "--out", "r"], ["commission"])
-    yield Run("design_discrimination", ["design", "--robot", ROBOT, "--for", "discrimination", "--between", "coulomb",
-                                        "--between", "caster_drag", "--size", "coulomb=0.2", *LIMITS, "--out", "r"])
-    yield Run("choose", ["choose", HEALTHY, "--robot", ROBOT, "--fault", "wheel_radius=0.05", "--out", "r"])
-    yield Run("sensitivity", ["sensitivity", STUDY, "--out", "r"])
-    yield Run("gap", ["gap", "../simulate_pose/log.csv", "--robot", ROBOT, "--baseline", HEALTHY, "--out", "r"],
-              ["simulate_pose"])
-    yield Run("convert", ["convert", HEALTHY, "log.csv"], quick=True)
-
-
-def recorded_runs():
-    data = SHARED / "data"
-    for name, log in (("emps", "emps/emps.csv"), ("warthog", "warthog/current.csv"),
-                      ("regbot", "regbot_fleet/run_00.csv")):
-        robot = str(data / f"{name}.yaml")
-        for command in ("commission", "identify", "doctor", "gap"):
-            if (name, command) == ("regbot", "gap"):  # six seconds, of which nothing is left to compare
-                continue
-            yield Run(f"{name}_{command}", [command, str(data / log), "--robot", robot, "--out", "r"])
-    yield Run("regbot_fleet", ["fleet", str(data / "regbot_fleet"), "--robot", str(data / "regbot.yaml"), "--out", "r"])
-    cases = SHARED / "withheld-dev"
-    for case in ("case_000", "case_007", "case_014", "case_021", "case_030", "case_038"):
-        folder = cases / case
-        if not folder.is_dir():
-            continue
-        robot, base, log = (str(folder / n) for n in ("robot.yaml", "baseline.csv.gz", "real.csv.gz"))
-        yield Run(f"{case}_commission", ["commission", base, "--robot", robot, "--out", "r"])
-        yield Run(f"{case}_identify", ["identify", base, "--robot", robot, "--out", "r"])
-        yield Run(f"{case}_gap", ["gap", log, "--robot", robot, "--baseline", base, "--out", "r"])
-        yield Run(f"{case}_detect", ["detect", log, "--model", f"../{case}_commission/r/model.json", "--out", "r"],
-                  [f"{case}_commission"])
+HASHED = {".json", ".csv", ".h", ".yaml", ".jsonl", ".urdf", ".xml", ".sdf"}
+WORDS = {".html", ".txt", ".md", ".1"}
+ROUNDING = 1e-15  # rad
+NO_THREADS = {"completion", "man", "--version"}
 
 
 def with_needs(runs, names):
@@ -126,35 +57,90 @@ def without_volatile(value):
     return value
 
 
-def digest(path):
+def comparable(path):
+    """The bytes of a file without what may differ between equal results: the software's name and version in JSON."""
     content = path.read_bytes()
     if path.suffix == ".json":
-        content = json.dumps(without_volatile(json.loads(content)), sort_keys=False).encode()
-    return hashlib.sha256(content).hexdigest()[:16]
+        return json.dumps(without_volatile(json.loads(content))).encode()
+    if path.suffix == ".jsonl":
+        return "\n".join(json.dumps(without_volatile(json.loads(line))) for line in content.splitlines()).encode()
+    return content
 
 
-def results_of(run, program, folder, words):
+def digest(path):
+    return hashlib.sha256(comparable(path)).hexdigest()[:16]
+
+
+def columns(path):
+    with path.open(newline="", encoding="utf-8") as file:
+        names, *rows = csv.reader(file)
+    return dict(zip(names, zip(*rows)))
+
+
+def same_column(name, old, new):
+    """Whether the texts are equal; a heading, which ROS messages hold as a quaternion, may differ by its rounding."""
+    if name != "theta" or len(old) != len(new):
+        return old == new
+    return all(a == b or abs(float(a) - float(b)) <= ROUNDING for a, b in zip(old, new))
+
+
+def column_difference(before, after):
+    """What tells the columns of two CSV files apart; "equal" where nothing does."""
+    old, new = columns(before), columns(after)
+    if set(old) != set(new):
+        return f"columns {', '.join(sorted(set(old) ^ set(new)))} are in one only"
+    differing = (name for name in sorted(old) if not same_column(name, old[name], new[name]))
+    return next((f"column {name} differs" for name in differing), "equal")
+
+
+def module_folder(program):
+    """Where the Python module of the same build is; nothing where it is not built."""
+    folder = program.parent.parent / "python"
+    return folder if any(folder.glob("wheelwright/_core*.so")) else None
+
+
+def command_of(run, call, program, threads):
+    # Results name the files they come from: as seen from the run's folder, wherever this repository lies.
+    call = [word.replace(str(INPUTS), "../inputs").replace(str(ROOT / "examples"), "../shipped")
+            .replace(str(SHARED), "../recorded") for word in call]
+    if run.python:
+        return [sys.executable, "-B", *call]
+    return [program, *call, *(["--threads", str(threads)] if threads and call[0] not in NO_THREADS else [])]
+
+
+def results_of(run, program, folder, words, threads):
     here = folder / run.name
     here.mkdir()
+    for name, text in run.files.items():
+        (here / name).write_text(text, encoding="utf-8")
     environment = dict(os.environ, GLIBC_TUNABLES="glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F", LC_ALL="C")
-    # Results name the files they come from: as seen from the run's folder, wherever this repository lies.
-    call = [word.replace(str(ROOT / "examples"), "../shipped").replace(str(SHARED), "../recorded")
-            for word in run.words]
-    done = subprocess.run([program, *call], cwd=here, env=environment, capture_output=True, check=False)
-    found = {"exit": done.returncode}
-    if "--json" in run.words:
-        (here / "stdout.json").write_bytes(done.stdout)
+    if run.python:
+        environment["PYTHONPATH"] = str(module_folder(program))
+    codes, printed, complaint = [], b"", ""
+    for call in run.calls:
+        done = subprocess.run(command_of(run, call, program, threads), cwd=here, env=environment, capture_output=True,
+                              input=(here / run.stdin).read_bytes() if run.stdin else b"", check=False)
+        codes.append(done.returncode)
+        printed, complaint = done.stdout, done.stderr.decode(errors="replace").strip()[:300]
+    found = {"exit": codes[0] if len(codes) == 1 else codes}
+    if run.printed:
+        (here / run.printed).write_bytes(printed)
     elif words:
-        (here / "stdout.txt").write_bytes(done.stdout)
+        (here / "stdout.txt").write_bytes(printed)
     for path in sorted(p for p in here.rglob("*") if p.is_file()):
-        if path.suffix in HASHED or (words and path.suffix in WORDS):
-            found[str(path.relative_to(here))] = digest(path)
-    if len(found) == 1:
-        found["error"] = done.stderr.decode(errors="replace").strip()[:300]
+        name = str(path.relative_to(here))
+        if name not in run.files and (path.suffix in HASHED or (words and path.suffix in WORDS)):
+            found[name] = digest(path)
+    failed = len(found) == 1 or (run.python and codes != [0])
+    if run.same and not failed:
+        found["columns"] = column_difference(*(here / name for name in run.same))
+        failed, complaint = found["columns"] != "equal", f"{' and '.join(run.same)}: {found['columns']}"
+    if failed:
+        found["error"] = complaint
     return found
 
 
-def all_results(runs, program, jobs, words, keep):
+def all_results(runs, program, jobs, words, threads, keep):
     results, waiting = {}, list(runs)
     if keep:
         keep.mkdir(parents=True)
@@ -162,10 +148,11 @@ def all_results(runs, program, jobs, words, keep):
         going, folder = {}, (keep or pathlib.Path(temporary)).resolve()
         (folder / "shipped").symlink_to(ROOT / "examples")
         (folder / "recorded").symlink_to(SHARED)
+        (folder / "inputs").symlink_to(INPUTS)
         while waiting or going:
             for run in [r for r in waiting if all(n in results for n in r.needs)]:
                 waiting.remove(run)
-                going[pool.submit(results_of, run, program, folder, words)] = run
+                going[pool.submit(results_of, run, program, folder, words, threads)] = run
             for future in concurrent.futures.wait(going, return_when=concurrent.futures.FIRST_COMPLETED).done:
                 run = going.pop(future)
                 results[run.name] = future.result()
@@ -217,6 +204,7 @@ def main():
     parser.add_argument("--against", type=pathlib.Path)
     parser.add_argument("--only", action="append", help="runs of these names, with what they need")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--threads", type=int, help="of each run; by default the program's own choice")
     parser.add_argument("--keep", type=pathlib.Path, help="a new folder for the results themselves")
     parser.add_argument("--numbers", nargs=2, type=pathlib.Path, metavar=("BEFORE", "NOW"))
     options = parser.parse_args()
@@ -225,7 +213,11 @@ def main():
         return 0
     if not options.program:
         parser.error("--program is missing")
-    runs = list(shipped_runs())
+    program = options.program.resolve()
+    runs = [r for r in all_runs() if options.words or not r.words]
+    if not module_folder(program):
+        print("freeze: no Python module beside the program: its results are left out", file=sys.stderr)
+        runs = [r for r in runs if not r.python]
     if options.quick:
         runs = with_needs(runs, [r.name for r in runs if r.quick])
     elif (SHARED / "data").is_dir():
@@ -234,7 +226,7 @@ def main():
         print("freeze: no shared recordings here: shipped and simulated logs only", file=sys.stderr)
     if options.only:
         runs = with_needs(runs, options.only)
-    results = all_results(runs, options.program.resolve(), options.jobs, options.words, options.keep)
+    results = all_results(runs, program, options.jobs, options.words, options.threads, options.keep)
     if options.write:
         options.write.write_text(json.dumps(results, indent=1) + "\n")
     failed = [f"{n}: {r['error']}" for n, r in results.items() if "error" in r]
