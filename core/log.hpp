@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -82,6 +83,29 @@ void for_each_row(LogSource& log, Visit&& visit) {
     }
   }
   log.rewind();
+}
+
+/// A row of a log as filters and detectors take it.
+struct LogSample {
+  std::size_t row = 0;             ///< its number within the whole log
+  double t = 0.0;                  ///< time, s
+  std::span<const double> values;  ///< of the columns that were asked for, in that order; valid during the visit
+  bool starts = false;             ///< a segment starts here
+};
+
+/// visit(LogSample) for every row of `log`, with the values of `columns`. The log is rewound before and after. Throws
+/// InvalidArgument where a column is not there, `why` behind its name.
+template <typename Visit>
+void for_each_sample(LogSource& log, const std::vector<std::string>& columns, Visit&& visit,
+                     const std::string& why = "") {
+  const std::vector<std::size_t> pick = positions_of(log, columns, why);
+  std::vector<double> values(pick.size());
+  for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
+    for (std::size_t c = 0; c < pick.size(); ++c) {
+      values[c] = block.columns[pick[c]][k];
+    }
+    visit(LogSample{block.first_row + k, block.t[k], values, starts});
+  });
 }
 
 /// Median of the steps of `t` (the steps across segment starts included), s; 0 for fewer than two rows.

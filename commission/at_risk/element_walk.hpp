@@ -22,18 +22,13 @@ namespace wheelwright::commission {
 /// end() where a segment's last element was.
 template <typename Begin, typename Each, typename End>
 void walk_elements(LogSource& log, filter::ElementFilter& filter, Begin&& begin, Each&& each, End&& end) {
-  const std::vector<std::size_t> pick = core::positions_of(log, filter.measurement().columns());
-  std::vector<double> sample(pick.size());
   bool open = false;
   filter.restart();
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
+  core::for_each_sample(log, filter.measurement().columns(), [&](const core::LogSample& sample) {
+    if (sample.starts) {
       filter.restart();
     }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    const bool element = filter.step(block.t[k], sample);
+    const bool element = filter.step(sample.t, sample.values);
     if (filter.began()) {
       if (open) {
         end();

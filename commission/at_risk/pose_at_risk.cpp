@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -150,24 +151,21 @@ core::Assumption assumed_pose(const Robot& robot) {
 }  // namespace
 
 PoseSteps pose_steps(LogSource& log, const filter::OdometryMeasurement& measurement) {
-  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
-  std::vector<double> steps, pose(pick.size() - 2), last(pose.size());
+  std::vector<double> steps, last;
   double before = 0.0;
   bool any = false;
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    for (std::size_t c = 2; c < pick.size(); ++c) {
-      pose[c - 2] = block.columns[pick[c]][k];
-    }
-    any = any && !starts;
-    if (any && measurement.held_pose && pose == last) {
+  core::for_each_sample(log, measurement.columns(), [&](const core::LogSample& sample) {
+    const std::span<const double> pose = sample.values.subspan(2);
+    any = any && !sample.starts;
+    if (any && measurement.held_pose && std::ranges::equal(pose, last)) {
       return;
     }
     if (any) {
-      steps.push_back(block.t[k] - before);
+      steps.push_back(sample.t - before);
     }
     any = true;
-    before = block.t[k];
-    last = pose;
+    before = sample.t;
+    last.assign(pose.begin(), pose.end());
   });
   PoseSteps result;
   if (!steps.empty()) {

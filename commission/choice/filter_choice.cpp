@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -33,7 +34,7 @@ class Trial {
     row_.resize(1, 1, model.p());
   }
   void restart() { filter_.restart(); }
-  void step(double t, const std::vector<double>& sample) {
+  void step(double t, std::span<const double> sample) {
     if (!filter_.step(t, sample)) {
       return;
     }
@@ -102,19 +103,12 @@ FilterChoice by_residual(LogSource& log, const Model& model, const Measurement& 
     choice.reason = "the log is too short, or sampled too slowly, for a choice";
     return choice;
   }
-  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
-  std::vector<double> sample(pick.size());
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
-      for (Trial& trial : trials) {
+  core::for_each_sample(log, measurement.columns(), [&](const core::LogSample& sample) {
+    for (Trial& trial : trials) {
+      if (sample.starts) {
         trial.restart();
       }
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    for (Trial& trial : trials) {
-      trial.step(block.t[k], sample);
+      trial.step(sample.t, sample.values);
     }
   });
   std::vector<std::vector<double>> noise;

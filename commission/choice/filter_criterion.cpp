@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include <Eigen/Core>
 
@@ -34,7 +35,7 @@ class Rows {
   }
   void restart() { filter_.restart(); }
   template <typename Take>
-  void step(double t, const std::vector<double>& sample, Take take) {
+  void step(double t, std::span<const double> sample, Take take) {
     if (!filter_.step(t, sample)) {
       return;
     }
@@ -85,23 +86,17 @@ void walk(LogSource& log, const Model& model, const Measurement& measurement, co
   for (const FilterDesign& design : designs) {
     filters.emplace_back(model, design, measurement);
   }
-  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
-  std::vector<double> sample(pick.size());
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
+  core::for_each_sample(log, measurement.columns(), [&](const core::LogSample& sample) {
     for (std::size_t f = 0; f < filters.size(); ++f) {
-      if (starts) {
+      if (sample.starts) {
         filters[f].restart();
       }
-      filters[f].step(block.t[k], sample, [&](const RegressionBlock& rows) { take(f, rows); });
+      filters[f].step(sample.t, sample.values, [&](const RegressionBlock& rows) { take(f, rows); });
     }
   });
   for (std::size_t f = 0; f < filters.size(); ++f) {
     filters[f].flush([&](const RegressionBlock& rows) { take(f, rows); });
   }
-  log.rewind();
 }
 
 double geometric_mean(const Eigen::VectorXd& values, const std::vector<bool>& counts) {

@@ -23,33 +23,21 @@ namespace wheelwright::commission {
 /// rewinds the log. Throws InvalidArgument when the log lacks a column.
 template <filter::RowFilter Filter, typename At>
 std::size_t walk_detector(LogSource& log, Detector<Filter>& detector, const At& at) {
-  const std::vector<std::size_t> pick =
-      core::positions_of(log, detector.filter().measurement().columns(), ", which the model was commissioned on");
-  std::vector<double> sample(pick.size());
   std::size_t rows = 0;
   bool first = true;
-  log.rewind();
-  LogBlock block;
-  while (log.next(block)) {
-    rows += block.rows();
-    std::size_t segment = 0;
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      if (segment < block.segment_starts.size() && block.segment_starts[segment] == k) {
-        ++segment;
-        detector.restart();
-        first = true;
-      }
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        sample[c] = block.columns[pick[c]][k];
-      }
-      const Decision& decision = detector.step(block.t[k], sample);
-      if (decision.valid) {
-        at(block.first_row + k, block.t[k], first, decision);
-        first = false;
-      }
+  const auto visit = [&](const core::LogSample& sample) {
+    ++rows;
+    if (sample.starts) {
+      detector.restart();
+      first = true;
     }
-  }
-  log.rewind();
+    const Decision& decision = detector.step(sample.t, sample.values);
+    if (decision.valid) {
+      at(sample.row, sample.t, first, decision);
+      first = false;
+    }
+  };
+  core::for_each_sample(log, detector.filter().measurement().columns(), visit, ", which the model was commissioned on");
   return rows;
 }
 

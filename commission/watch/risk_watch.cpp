@@ -70,17 +70,12 @@ namespace {
 // Walks `log` through a detector; `recorder` takes what it says.
 template <typename AnyDetector>
 void record(LogSource& log, const std::vector<std::string>& columns, AnyDetector detector, RiskRecorder& recorder) {
-  const std::vector<std::size_t> pick = core::positions_of(log, columns);
-  std::vector<double> sample(pick.size());
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
+  core::for_each_sample(log, columns, [&](const core::LogSample& sample) {
+    if (sample.starts) {
       detector.restart();
     }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    detector.step(block.t[k], sample);
-    recorder.add(detector, block.t[k]);
+    detector.step(sample.t, sample.values);
+    recorder.add(detector, sample.t);
   });
 }
 

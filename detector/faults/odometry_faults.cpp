@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include <Eigen/LU>
 
@@ -25,79 +26,71 @@ Eigen::Vector2d mean_direction(double from, double to) {
 
 OdometryReference read_odometry(LogSource& log, filter::OdometryFilter filter, const Model& model) {
   const filter::OdometryMeasurement& measurement = filter.measurement();
-  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
   const std::size_t n = measurement.outputs().size(), p = measurement.parameters().size();
   const std::size_t heading_at = measurement.position ? 4 : 2;
   OdometryReference reference;
   ReferenceMotion& motion = reference.motion;
-  std::vector<double> sample(pick.size()), angle, regressor, regressor_error, y, dy;
+  std::vector<double> angle, regressor, regressor_error, y, dy;
   const auto append = [](std::vector<double>& to, const auto& from) {
     to.insert(to.end(), from.data(), from.data() + from.size());
   };
-  log.rewind();
-  LogBlock block;
   std::array<double, 2> way{}, speed{};
   std::array<double, 3> pose{};
   double turns = 0.0, before = 0.0;
   bool begins = true;
-  while (log.next(block)) {
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      if (std::binary_search(block.segment_starts.begin(), block.segment_starts.end(), k)) {
-        filter.restart();
-        begins = true;
-      }
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        sample[c] = block.columns[pick[c]][k];
-      }
-      const bool settled = filter.step(block.t[k], sample);
-      for (std::size_t w = 0; w < 2; ++w) {
-        if (measurement.motion == MotionKind::angle) {
-          way[w] = sample[w];
-        } else {
-          way[w] = begins ? 0.0 : way[w] + 0.5 * (block.t[k] - before) * (speed[w] + sample[w]);
-        }
-        speed[w] = sample[w];
-      }
-      before = block.t[k];
-      std::array<double, 3> next{};
-      std::copy(sample.begin() + 2,
-                sample.begin() + static_cast<std::ptrdiff_t>(measurement.heading ? heading_at + 1 : 2), next.begin());
-      if (measurement.held_pose && !begins && next == pose) {
-        continue;
-      }
-      pose = next;
-      double heading = measurement.heading ? sample[heading_at] : 0.0;
-      if (begins) {
-        motion.segment_starts.push_back(motion.t.size());
-        turns = 0.0;
-      } else if (measurement.heading) {
-        heading += 2.0 * std::numbers::pi * turns;
-        const double jumps = std::round((heading - motion.heading.back()) / (2.0 * std::numbers::pi));
-        turns -= jumps;
-        heading -= 2.0 * std::numbers::pi * jumps;
-      } else {  // a gyro alone: wheels' own heading
-        const double* last = angle.data() + angle.size() - 2;
-        heading =
-            motion.heading.back() + model.motion(1, 0) * (way[0] - last[0]) + model.motion(1, 1) * (way[1] - last[1]);
-      }
-      begins = false;
-      motion.sample.push_back(block.first_row + k);
-      motion.t.push_back(block.t[k]);
-      motion.heading.push_back(heading);
-      motion.settled.push_back(settled);
-      append(angle, way);
-      append(regressor, filter.row().Y);
-      append(regressor_error, filter.row().dY);
-      append(y, filter.row().y);
-      append(dy, filter.row().dy);
-      const auto start =
-          settled ? std::lower_bound(motion.t.begin() + static_cast<std::ptrdiff_t>(motion.segment_starts.back()),
-                                     motion.t.end(), filter.window_start())
-                  : motion.t.end() - 1;
-      reference.window.push_back(static_cast<std::size_t>(start - motion.t.begin()));
+  core::for_each_sample(log, measurement.columns(), [&](const core::LogSample& sample) {
+    const std::span<const double> now = sample.values;
+    if (sample.starts) {
+      filter.restart();
+      begins = true;
     }
-  }
-  log.rewind();
+    const bool settled = filter.step(sample.t, now);
+    for (std::size_t w = 0; w < 2; ++w) {
+      if (measurement.motion == MotionKind::angle) {
+        way[w] = now[w];
+      } else {
+        way[w] = begins ? 0.0 : way[w] + 0.5 * (sample.t - before) * (speed[w] + now[w]);
+      }
+      speed[w] = now[w];
+    }
+    before = sample.t;
+    std::array<double, 3> next{};
+    std::copy(now.begin() + 2, now.begin() + static_cast<std::ptrdiff_t>(measurement.heading ? heading_at + 1 : 2),
+              next.begin());
+    if (measurement.held_pose && !begins && next == pose) {
+      return;
+    }
+    pose = next;
+    double heading = measurement.heading ? now[heading_at] : 0.0;
+    if (begins) {
+      motion.segment_starts.push_back(motion.t.size());
+      turns = 0.0;
+    } else if (measurement.heading) {
+      heading += 2.0 * std::numbers::pi * turns;
+      const double jumps = std::round((heading - motion.heading.back()) / (2.0 * std::numbers::pi));
+      turns -= jumps;
+      heading -= 2.0 * std::numbers::pi * jumps;
+    } else {  // a gyro alone: wheels' own heading
+      const double* last = angle.data() + angle.size() - 2;
+      heading =
+          motion.heading.back() + model.motion(1, 0) * (way[0] - last[0]) + model.motion(1, 1) * (way[1] - last[1]);
+    }
+    begins = false;
+    motion.sample.push_back(sample.row);
+    motion.t.push_back(sample.t);
+    motion.heading.push_back(heading);
+    motion.settled.push_back(settled);
+    append(angle, way);
+    append(regressor, filter.row().Y);
+    append(regressor_error, filter.row().dY);
+    append(y, filter.row().y);
+    append(dy, filter.row().dy);
+    const auto start =
+        settled ? std::lower_bound(motion.t.begin() + static_cast<std::ptrdiff_t>(motion.segment_starts.back()),
+                                   motion.t.end(), filter.window_start())
+                : motion.t.end() - 1;
+    reference.window.push_back(static_cast<std::size_t>(start - motion.t.begin()));
+  });
   motion.instant = motion.t;
   const auto count = static_cast<Eigen::Index>(motion.t.size()), columns = static_cast<Eigen::Index>(p);
   motion.joint_angle = Eigen::Map<const Eigen::MatrixXd>(angle.data(), 2, count);

@@ -24,20 +24,17 @@ std::size_t effort_reach(const Measurement& m, const filter::SignalErrors& error
 }
 
 ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
-  const std::vector<std::size_t> pick = core::positions_of(log, filter.measurement().columns());
   const std::size_t n = filter.model().n(), p = filter.model().p();
   const auto coordinates = static_cast<Eigen::Index>(filter.model().coordinates.size());
   const auto joints = static_cast<Eigen::Index>(filter.model().joints.size());
   ReferenceMotion motion;
   motion.rows.outputs = n;
   motion.rows.parameters = p;
-  std::vector<double> sample(pick.size()), speed, joint_speed, joint_angle, y, dy, regressor, regressor_error;
+  std::vector<double> speed, joint_speed, joint_angle, y, dy, regressor, regressor_error;
   Eigen::VectorXd angle = Eigen::VectorXd::Zero(joints), before = angle;
   const auto append = [](std::vector<double>& to, const auto& from) {
     to.insert(to.end(), from.data(), from.data() + from.size());
   };
-  log.rewind();
-  LogBlock block;
   const bool nodes = filter.measurement().motion != MotionKind::speed;
   motion.kind = filter.measurement().motion;
   motion.nominal_step = filter.measurement().nominal_step;
@@ -45,46 +42,40 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
   motion.errors = filter.errors();
   motion.measured = true;
   std::size_t seen = 0;
-  while (log.next(block)) {
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      if (std::binary_search(block.segment_starts.begin(), block.segment_starts.end(), k)) {
-        filter.restart();
-        seen = 0;
-      }
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        sample[c] = block.columns[pick[c]][k];
-      }
-      const bool settled = filter.step(block.t[k], sample);
-      if (filter.instants() == 0 || filter.instants() == seen) {
-        seen = filter.instants();
-        continue;
-      }
-      const double length = !nodes && filter.instants() == 1 ? 0.0 : filter.step_length();
-      if (filter.instants() == 1) {
-        motion.segment_starts.push_back(motion.t.size());
-        angle.setZero();
-      } else {
-        const double earlier = nodes ? motion.step.back() : length;
-        angle += 0.5 * (earlier * before + length * filter.joint_speed());
-      }
-      seen = filter.instants();
-      before = filter.joint_speed();
-      motion.sample.push_back(block.first_row + k);
-      motion.t.push_back(block.t[k]);
-      motion.instant.push_back(filter.instant());
-      motion.step.push_back(length);
-      motion.heading.push_back(filter.heading());
-      motion.settled.push_back(settled && !filter.rests_on_standstill());
-      append(speed, filter.speed());
-      append(joint_speed, before);
-      append(joint_angle, angle);
-      append(regressor, filter.row().Y);
-      append(regressor_error, filter.row().dY);
-      append(y, filter.row().y);
-      append(dy, filter.row().dy);
+  core::for_each_sample(log, filter.measurement().columns(), [&](const core::LogSample& sample) {
+    if (sample.starts) {
+      filter.restart();
+      seen = 0;
     }
-  }
-  log.rewind();
+    const bool settled = filter.step(sample.t, sample.values);
+    if (filter.instants() == 0 || filter.instants() == seen) {
+      seen = filter.instants();
+      return;
+    }
+    const double length = !nodes && filter.instants() == 1 ? 0.0 : filter.step_length();
+    if (filter.instants() == 1) {
+      motion.segment_starts.push_back(motion.t.size());
+      angle.setZero();
+    } else {
+      const double earlier = nodes ? motion.step.back() : length;
+      angle += 0.5 * (earlier * before + length * filter.joint_speed());
+    }
+    seen = filter.instants();
+    before = filter.joint_speed();
+    motion.sample.push_back(sample.row);
+    motion.t.push_back(sample.t);
+    motion.instant.push_back(filter.instant());
+    motion.step.push_back(length);
+    motion.heading.push_back(filter.heading());
+    motion.settled.push_back(settled && !filter.rests_on_standstill());
+    append(speed, filter.speed());
+    append(joint_speed, before);
+    append(joint_angle, angle);
+    append(regressor, filter.row().Y);
+    append(regressor_error, filter.row().dY);
+    append(y, filter.row().y);
+    append(dy, filter.row().dy);
+  });
   const auto k = static_cast<Eigen::Index>(motion.t.size());
   motion.speed = Eigen::Map<const Eigen::MatrixXd>(speed.data(), coordinates, k);
   motion.joint_speed = Eigen::Map<const Eigen::MatrixXd>(joint_speed.data(), joints, k);

@@ -197,19 +197,13 @@ class PoseSumDetector {
 /// begins; calls taken(whether sums were looked at) after each.
 template <typename Wanted, typename Taken>
 void walk_pose_samples(LogSource& log, PoseSumDetector& detector, const Wanted& wanted, const Taken& taken) {
-  const std::vector<std::size_t> pick = core::positions_of(log, detector.measurement().columns());
-  std::vector<double> sample(pick.size());
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
+  core::for_each_sample(log, detector.measurement().columns(), [&](const core::LogSample& sample) {
+    if (sample.starts) {
       detector.restart();
     }
-    if (!wanted(block.t[k])) {
-      return;
+    if (wanted(sample.t)) {
+      taken(detector.step(sample.t, sample.values));
     }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    taken(detector.step(block.t[k], sample));
   });
 }
 

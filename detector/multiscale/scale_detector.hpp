@@ -188,17 +188,12 @@ inline constexpr double kFirstMultiple = 0.25;
 /// whether it begins a segment, whether sums were looked at).
 template <typename Visit>
 void walk_log(LogSource& log, ScaleDetector& detector, Visit&& visit) {
-  const std::vector<std::size_t> pick = core::positions_of(log, detector.elements().measurement().columns());
-  std::vector<double> sample(pick.size());
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
+  core::for_each_sample(log, detector.elements().measurement().columns(), [&](const core::LogSample& sample) {
+    if (sample.starts) {
       detector.restart();
     }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    const bool looked = detector.step(block.t[k], sample);
-    visit(block.t[k], starts, looked);
+    const bool looked = detector.step(sample.t, sample.values);
+    visit(sample.t, sample.starts, looked);
   });
 }
 

@@ -144,26 +144,21 @@ class ReadingErrors {
 template <typename Earlier, typename Element, typename Look>
 bool walk_sums(LogSource& log, ScaleDetector& detector, const ReferenceMotion& motion, const SumDriveOptions& options,
                Earlier&& earlier, Element&& element, Look&& look) {
-  const std::vector<std::size_t> pick = core::positions_of(log, detector.elements().measurement().columns());
-  std::vector<double> sample(pick.size());
   std::size_t seen = 0, count = 0;
   double begun = 0.0;
   bool any = false, fits = true, over = false;
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    over = over || count == motion.instants() || (any && !options.piece && block.t[k] - begun > options.most);
+  core::for_each_sample(log, detector.elements().measurement().columns(), [&](const core::LogSample& sample) {
+    over = over || count == motion.instants() || (any && !options.piece && sample.t - begun > options.most);
     if (over || !fits) {
       return;
     }
-    begun = any ? begun : block.t[k];
+    begun = any ? begun : sample.t;
     any = true;
-    if (starts) {
+    if (sample.starts) {
       detector.restart();
       seen = 0;
     }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    detector.step(block.t[k], sample);
+    detector.step(sample.t, sample.values);
     const std::size_t instants = detector.elements().instants();
     if (instants == 0 || instants == seen) {
       seen = instants;
@@ -171,7 +166,7 @@ bool walk_sums(LogSource& log, ScaleDetector& detector, const ReferenceMotion& m
     }
     seen = instants;
     if (options.piece && count == 0 &&
-        (block.first_row + k < *options.piece || detector.elements().instant() < motion.instant.front())) {
+        (sample.row < *options.piece || detector.elements().instant() < motion.instant.front())) {
       if (instants > 1) {
         earlier();
       }
@@ -183,7 +178,7 @@ bool walk_sums(LogSource& log, ScaleDetector& detector, const ReferenceMotion& m
     }
     element(count, instants > 1);
     for (const SumState& state : detector.looks()) {
-      look(count, block.t[k], state);
+      look(count, sample.t, state);
     }
     ++count;
   });

@@ -37,20 +37,15 @@ Jet stribeck(double omega, const Jet& omega_s) {
 StribeckRows::StribeckRows(LogSource& log, RegressorFilter filter)
     : kernel_(filter.design(), filter.measurement().motion, filter.measurement().nominal_step),
       input_(filter.model().input) {
-  const Measurement& measurement = filter.measurement();
-  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
   const auto joints = filter.model().joints.size();
-  std::vector<double> sample(pick.size()), speeds, Y, y;
+  std::vector<double> speeds, Y, y;
   std::size_t seen = 0;
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
+  core::for_each_sample(log, filter.measurement().columns(), [&](const core::LogSample& sample) {
+    if (sample.starts) {
       filter.restart();
       seen = 0;
     }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    const bool gives_row = filter.step(block.t[k], sample);
+    const bool gives_row = filter.step(sample.t, sample.values);
     if (filter.instants() != 0 && filter.instants() != seen) {
       instants_.push_back({filter.step_length(), filter.instants() == 1, gives_row});
       const Eigen::VectorXd& speed = filter.joint_speed();
