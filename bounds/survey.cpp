@@ -223,10 +223,8 @@ RowSurvey survey(core::RegressionSource& source, const Box& prior, const std::ve
   }
   Groups groups(p);
   EvenSample sample(source.outputs(), p);
-  RegressionBlock block;
   std::vector<Eigen::Index> support;
-  source.rewind();
-  while (source.next(block)) {
+  core::for_each_block(source, [&](const RegressionBlock& block) {
     check::that(block.parameters == p && block.outputs == source.outputs(), "regression block", "the source's shape");
     for (std::size_t k = 0; k < block.instants(); ++k) {
       if (std::binary_search(excluded.begin(), excluded.end(), block.sample[k])) {
@@ -269,7 +267,7 @@ RowSurvey survey(core::RegressionSource& source, const Box& prior, const std::ve
         }
       }
     }
-  }
+  });
   result.information = result.information.selfadjointView<Eigen::Lower>();
   result.blocks = groups.list();
   result.sample = sample.take();

@@ -102,14 +102,12 @@ std::vector<JointFit> fit_joints(LogSource& log, const Setting& s) {
   const auto columns = side_by_side(s.model);
   std::vector<identify::LeastSquares> sums(joints, identify::LeastSquares(columns.size()));
   TorqueRows rows = make_rows(log, s, errors_of_fit(s));
-  RegressionBlock block;
   const auto each = [&](auto&& visit) {
-    rows.rewind();
-    while (rows.next(block)) {
+    core::for_each_block(rows, [&](const RegressionBlock& block) {
       for (std::size_t j = 0; j < joints; ++j) {
         visit(j, joint_rows(block, shares.row(static_cast<Eigen::Index>(j)), columns));
       }
-    }
+    });
   };
   each([&](std::size_t j, const RegressionBlock& of_joint) { sums[j].add(of_joint); });
   if (sums.front().instants() < kFewestInstants) {
@@ -287,11 +285,7 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
   rows.rewind();
   const identify::LeastSquaresFit fit = least_squares(rows, weights);
   identify::ResidualStatistics statistics(fit.estimate, weights);
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
-    statistics.add(block);
-  }
+  core::for_each_block(rows, [&](const RegressionBlock& block) { statistics.add(block); });
   log.rewind();
   const identify::ResidualSummary summary = statistics.summary(fit.inverse_gram);
   const double estimate = fit.estimate[at], error = summary.standard_error[at];
@@ -321,17 +315,15 @@ void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::v
   const double biased = 2.0 * bias.cwiseAbs().maxCoeff();  // standard errors that two halves may differ by
   const std::size_t middle = s.survey.rows / 2;
   TorqueRows rows = make_rows(log, s, errors_of_fit(s));
-  RegressionBlock block;
-  const auto each = [&](auto&& visit) {
-    rows.rewind();
-    while (rows.next(block)) {
-      const auto from = std::ranges::lower_bound(block.sample, middle) - block.sample.begin();
-      visit(std::size_t{0}, std::size_t{0}, static_cast<std::size_t>(from));
-      visit(std::size_t{1}, static_cast<std::size_t>(from), block.instants());
-    }
+  const auto add_halves = [&](auto& halves) {
+    core::for_each_block(rows, [&](const RegressionBlock& block) {
+      const auto from = static_cast<std::size_t>(std::ranges::lower_bound(block.sample, middle) - block.sample.begin());
+      halves[0].add(block, 0, from);
+      halves[1].add(block, from, block.instants());
+    });
   };
   std::vector<identify::LeastSquares> sums(2, identify::LeastSquares(s.model.p(), fit.weights));
-  each([&](std::size_t half, std::size_t first, std::size_t last) { sums[half].add(block, first, last); });
+  add_halves(sums);
   if (std::min(sums[0].instants(), sums[1].instants()) < kFewestInstants) {
     return;
   }
@@ -345,7 +337,7 @@ void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::v
     fits.push_back(sum.solve(excluded));
     statistics.emplace_back(fits.back().estimate, fit.weights);
   }
-  each([&](std::size_t half, std::size_t first, std::size_t last) { statistics[half].add(block, first, last); });
+  add_halves(statistics);
   std::vector<identify::ResidualSummary> residuals;
   std::vector<std::vector<identify::ExcitationFinding>> excitation;
   for (std::size_t half = 0; half < 2; ++half) {
@@ -533,12 +525,10 @@ void weigh_efforts(LogSource& log, const Setting& s, const filter::SignalErrors&
   }
   double effort = 0.0, error = 0.0;
   TorqueRows rows = make_rows(log, s, errors);
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
     effort += block.y.squaredNorm();
     error += (block.dY * largest + block.dy).squaredNorm();
-  }
+  });
   log.rewind();
   const double share = effort > 0.0 ? std::sqrt(error / effort) : core::kInfinity;
   for (LogContradiction& c : contradictions) {

@@ -64,11 +64,7 @@ bool all(const std::vector<bool>& flags) {
 
 identify::ResidualSummary summarise(core::RegressionSource& rows, const Fit& fit) {
   identify::ResidualStatistics statistics(fit.estimate, fit.weights);
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
-    statistics.add(block);
-  }
+  core::for_each_block(rows, [&](const RegressionBlock& block) { statistics.add(block); });
   identify::ResidualSummary summary = statistics.summary(fit.squares.inverse_gram);
   if (!fit.choice.candidates.empty() && fit.choice.chosen > 0) {
     const identify::Estimate& best = fit.choice.best();
@@ -151,13 +147,11 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
   fit.factor = identify::LeastSquares(s.model.p(), fit.weights);
   TorqueRows stream = make_rows(log, s, errors_of_fit(s));
   FoldedSource rows(stream, part, s.survey.rows, s.folds);
-  RegressionBlock block;
   std::size_t instants = 0;
-  rows.rewind();
-  while (rows.next(block)) {
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
     fit.factor.add(block);
     instants += block.instants();
-  }
+  });
   if (instants == 0) {
     throw InvalidArgument(no_instant(s));
   }

@@ -222,12 +222,10 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(rows.outputs()));
   for (int pass = 0; pass < 2; ++pass) {
     identify::LeastSquares squares(rows.parameters(), weights);
-    RegressionBlock block;
-    rows.rewind();
-    while (rows.next(block)) {
+    core::for_each_block(rows, [&](RegressionBlock& block) {
       block.y -= block.Y * s.nominal;
       squares.add(block);
-    }
+    });
     if (squares.instants() < kFewestWindows * rows.parameters()) {
       return std::nullopt;
     }
@@ -239,10 +237,7 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
       }
       fit.squares.estimate += s.nominal;
       identify::ResidualStatistics statistics(fit.squares.estimate, weights);
-      rows.rewind();
-      while (rows.next(block)) {
-        statistics.add(block);
-      }
+      core::for_each_block(rows, [&](const RegressionBlock& block) { statistics.add(block); });
       fit.residuals = statistics.summary(fit.squares.inverse_gram);
     };
     solve();
@@ -331,10 +326,8 @@ BoundedSet bounded_set(const Frame& s, Part part, const OdometryFit& fit, std::v
 // A declared bound differs from row to row: the largest is told.
 void tell_declared(const Frame& s, const Eigen::VectorXd& theta, std::vector<OutputNoise>& noise) {
   filter::OdometryRows rows = make_rows(s, s.declared);
-  RegressionBlock block;
-  rows.rewind();
   const auto n = static_cast<Eigen::Index>(noise.size());
-  while (rows.next(block)) {
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
     for (Eigen::Index r = 0; r < block.rows(); ++r) {
       OutputNoise& o = noise[static_cast<std::size_t>(r % n)];
       if (o.origin == core::NoiseOrigin::declared) {
@@ -342,7 +335,7 @@ void tell_declared(const Frame& s, const Eigen::VectorXd& theta, std::vector<Out
         o.learning = o.bound;
       }
     }
-  }
+  });
 }
 
 std::vector<KinematicParameter> parameters_of(const Frame& s, const OdometryFit& fit, const Box& hull) {

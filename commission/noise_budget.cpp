@@ -32,9 +32,7 @@ bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSourc
     most[j] = std::max(std::abs(side.lower), std::abs(side.upper));
     most_noise[j] = noise_alone[static_cast<std::size_t>(j)] ? most[j] : 0.0;
   }
-  core::RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
     for (Eigen::Index r = 0; r < block.rows(); ++r) {
       const auto i = static_cast<std::size_t>(r % n);
       const auto row = block.Y.row(r).cwiseAbs();
@@ -47,7 +45,7 @@ bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSourc
         }
       }
     }
-  }
+  });
   bool any = false;
   for (std::size_t i = 0; i < noise.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);

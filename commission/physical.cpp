@@ -18,11 +18,7 @@ ParameterChoice choose_parameters(core::RegressionSource& rows, std::size_t basi
   FoldedSource training(rows, Part::training, log_rows, folds);
   FoldedSource held_out(rows, Part::held_out, log_rows, folds);
   identify::LeastSquares fit(rows.parameters());
-  RegressionBlock block;
-  training.rewind();
-  while (training.next(block)) {
-    fit.add(block);
-  }
+  core::for_each_block(training, [&](const RegressionBlock& block) { fit.add(block); });
   std::vector<bool> beyond(rows.parameters(), false);
   for (std::size_t j = basic; j < beyond.size(); ++j) {
     beyond[j] = true;
@@ -30,12 +26,11 @@ ParameterChoice choose_parameters(core::RegressionSource& rows, std::size_t basi
   const Eigen::VectorXd small = fit.solve(beyond).estimate;
   const Eigen::VectorXd large = fit.solve().estimate;
   double error_small = 0.0, error_large = 0.0, torque = 0.0;
-  held_out.rewind();
-  while (held_out.next(block)) {
+  core::for_each_block(held_out, [&](const RegressionBlock& block) {
     error_small += (block.y - block.Y * small).squaredNorm();
     error_large += (block.y - block.Y * large).squaredNorm();
     torque += block.y.squaredNorm();
-  }
+  });
   ParameterChoice choice;
   if (torque > 0.0) {
     choice.nrmse_basic = std::sqrt(error_small / torque);

@@ -125,9 +125,7 @@ std::vector<OutputValidation> validate_on(core::RegressionSource& rows, const de
   for (OutputValidation& v : results) {
     v.smallest_kappa = std::numeric_limits<double>::infinity();
   }
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
     for (Eigen::Index row = 0; row < block.rows(); ++row) {
       const std::size_t i = static_cast<std::size_t>(row) % block.outputs;
       OutputValidation& v = results[i];
@@ -152,7 +150,7 @@ std::vector<OutputValidation> validate_on(core::RegressionSource& rows, const de
         v.smallest_kappa = std::min(v.smallest_kappa, t.width() / least);
       }
     }
-  }
+  });
   for (std::size_t i = 0; i < results.size(); ++i) {
     OutputValidation& v = results[i];
     const Running& r = running[i];

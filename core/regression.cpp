@@ -52,10 +52,9 @@ bool RegressionTable::next(RegressionBlock& block) {
 }
 
 RegressionBlock read_all(RegressionSource& source) {
-  source.rewind();
-  RegressionBlock all, block;
+  RegressionBlock all;
   all.resize(0, source.outputs(), source.parameters());
-  while (source.next(block)) {
+  for_each_block(source, [&](const RegressionBlock& block) {
     all.sample.insert(all.sample.end(), block.sample.begin(), block.sample.end());
     all.t.insert(all.t.end(), block.t.begin(), block.t.end());
     all.Y.conservativeResize(all.rows(), Eigen::NoChange);
@@ -66,7 +65,7 @@ RegressionBlock read_all(RegressionSource& source) {
     all.dY.bottomRows(block.rows()) = block.dY;
     all.y.tail(block.rows()) = block.y;
     all.dy.tail(block.rows()) = block.dy;
-  }
+  });
   source.rewind();
   return all;
 }

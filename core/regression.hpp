@@ -69,6 +69,16 @@ class RegressionTable final : public RegressionSource {
   bool done_ = false;
 };
 
+/// visit(block) for every block of `source`, from its beginning; visits may change the block.
+template <typename Visit>
+void for_each_block(RegressionSource& source, Visit&& visit) {
+  RegressionBlock block;
+  source.rewind();
+  while (source.next(block)) {
+    visit(block);
+  }
+}
+
 /// Reads all of `source` (from its beginning) into one block.
 [[nodiscard]] RegressionBlock read_all(RegressionSource& source);
 

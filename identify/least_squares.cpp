@@ -119,11 +119,7 @@ LeastSquaresFit LeastSquares::solve(const std::vector<bool>& excluded) const {
 
 LeastSquaresFit least_squares(core::RegressionSource& rows, const Eigen::VectorXd& weights) {
   LeastSquares fit(rows.parameters(), weights);
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
-    fit.add(block);
-  }
+  core::for_each_block(rows, [&](const RegressionBlock& block) { fit.add(block); });
   return fit.solve();
 }
 

@@ -255,11 +255,7 @@ MomentSums RegressionMoments::of_output(std::size_t i) const {
 namespace {
 
 RegressionMoments walk(core::RegressionSource& rows, RegressionMoments sums) {
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
-    sums.add(block);
-  }
+  core::for_each_block(rows, [&](const RegressionBlock& block) { sums.add(block); });
   return sums;
 }
 

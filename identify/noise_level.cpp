@@ -233,9 +233,7 @@ Eigen::VectorXd largest_plausible_error(core::RegressionSource& rows, const Eige
     where_seen.push_back(scheffe(std::min(output.fit_freedom, summary.freedom)));
   }
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows.outputs()));
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
     const auto n = static_cast<Eigen::Index>(block.outputs);
     for (Eigen::Index row = 0; row < block.rows(); ++row) {
       const double residual = std::abs(block.y[row] - block.Y.row(row).dot(theta));
@@ -246,7 +244,7 @@ Eigen::VectorXd largest_plausible_error(core::RegressionSource& rows, const Eige
                                        everywhere * of(summary.stationary_covariance));
       largest[row % n] = std::max(largest[row % n], residual + std::sqrt(std::max(variance, 0.0)));
     }
-  }
+  });
   return largest;
 }
 

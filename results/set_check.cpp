@@ -30,12 +30,11 @@ RegressionBlock named_instants(const SetClaims& claims, core::RegressionSource& 
   std::ranges::for_each(claims.contradiction, [&](const NamedRow& row) { want(row.origin); });
   std::ranges::for_each(claims.facets, [&](const bounds::HalfSpace& facet) { want(facet.origin); });
 
-  RegressionBlock kept, block;
+  RegressionBlock kept;
   kept.resize(wanted.size(), claims.output_names.size(), claims.parameter_names.size());
   const auto n = static_cast<Eigen::Index>(claims.output_names.size());
   std::size_t count = 0;
-  rows.rewind();
-  while (rows.next(block)) {
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
     for (std::size_t k = 0; k < block.instants(); ++k) {
       if (wanted.contains(block.sample[k])) {
         const auto to = static_cast<Eigen::Index>(count) * n, from = static_cast<Eigen::Index>(k) * n;
@@ -47,7 +46,7 @@ RegressionBlock named_instants(const SetClaims& claims, core::RegressionSource& 
         kept.dy.segment(to, n) = block.dy.segment(from, n);
       }
     }
-  }
+  });
   kept.sample.resize(count);  // fewer than the storage holds where a name is no instant of this log
   kept.t.resize(count);
   return kept;

@@ -220,9 +220,7 @@ void add_active_rows(HullOptima& optima, core::RegressionSource& rows, std::vect
   std::ranges::sort(excluded);
   const bounds::SlabRows slabs(optima.prior);
   HalfSpace upper, lower;
-  RegressionBlock block;
-  rows.rewind();
-  while (rows.next(block)) {
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
     for (Eigen::Index r = 0; r < block.rows(); ++r) {
       if (std::ranges::binary_search(excluded, block.sample[static_cast<std::size_t>(r) / block.outputs])) {
         continue;
@@ -237,7 +235,7 @@ void add_active_rows(HullOptima& optima, core::RegressionSource& rows, std::vect
         }
       }
     }
-  }
+  });
 }
 
 OneSided bound_derivative(const HullOptima& optima, const HullOptimum& optimum, std::span<const RowRate> left,

@@ -265,11 +265,7 @@ class Fitting {
     }
     finish();
     Gathering gathering(loss_, theta_, scales_, options_.most_episodes);
-    RegressionBlock block;
-    rows_.rewind();
-    while (rows_.next(block)) {
-      gathering.add(block);
-    }
+    core::for_each_block(rows_, [&](const RegressionBlock& block) { gathering.add(block); });
     fit_.estimate = theta_;
     gathering.finish(fit_, options_.constraints);
     return fit_;
@@ -333,11 +329,8 @@ class Fitting {
       if (held_.all()) {
         add_reweighted(held_.block, theta_, scales_, loss_, sums);
       } else {
-        RegressionBlock block;
-        rows_.rewind();
-        while (rows_.next(block)) {
-          add_reweighted(block, theta_, scales_, loss_, sums);
-        }
+        core::for_each_block(
+            rows_, [&](const RegressionBlock& block) { add_reweighted(block, theta_, scales_, loss_, sums); });
       }
       ++fit_.passes;
       const Eigen::VectorXd before = theta_;
