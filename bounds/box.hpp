@@ -73,6 +73,13 @@ struct Box {
     return c;
   }
 
+  /// Largest |θ_j| of every side.
+  [[nodiscard]] Eigen::VectorXd magnitudes() const {
+    Eigen::VectorXd m(static_cast<Eigen::Index>(sides.size()));
+    std::transform(sides.begin(), sides.end(), m.begin(), core::magnitude);
+    return m;
+  }
+
   friend bool operator==(const Box&, const Box&) = default;
 
  private:

@@ -421,11 +421,7 @@ std::variant<Polytope, std::vector<WeightedRow>> Polytope::intersect(const std::
     RowBank own;
     own.parameters = parameters.size();
     Eigen::MatrixXd information = Eigen::MatrixXd::Zero(q, q);
-    Eigen::VectorXd farthest(q);
-    for (Eigen::Index k = 0; k < q; ++k) {
-      const Interval& side = part.sides[static_cast<std::size_t>(k)];
-      farthest[k] = std::max(std::abs(side.lower), std::abs(side.upper));
-    }
+    const Eigen::VectorXd farthest = part.magnitudes();
     for (const HalfSpace& row : rows) {
       if (row.a[static_cast<Eigen::Index>(parameters.front())] != 0.0 || !pick(row.a, parameters).isZero(0.0)) {
         const Eigen::VectorXd a = pick(row.a, parameters);

@@ -31,7 +31,7 @@ SlabRows::SlabRows(const Box& prior) {
     const bool open = side.lower < 0.0 && side.upper > 0.0;
     open_.push_back(open);
     sign_.push_back(side.lower >= 0.0 ? 1.0 : -1.0);
-    magnitude_.push_back(std::max(std::abs(side.lower), std::abs(side.upper)));
+    magnitude_.push_back(core::magnitude(side));
     if (open) {
       const Interval l{side.lower, side.lower}, u{side.upper, side.upper};
       slope_.push_back(quotient(u + l, u - l));

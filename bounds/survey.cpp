@@ -82,11 +82,7 @@ Eigen::VectorXd SpreadSample::weights(const Box& prior) const {
   const SlabColumns& rows = all();
   const auto p = static_cast<Eigen::Index>(rows.parameters());
   const auto n = static_cast<Eigen::Index>(rows.n);
-  Eigen::VectorXd reach(p);
-  for (Eigen::Index j = 0; j < p; ++j) {
-    const Interval& side = prior.sides[static_cast<std::size_t>(j)];
-    reach[j] = std::max(std::abs(side.lower), std::abs(side.upper));
-  }
+  const Eigen::VectorXd reach = prior.magnitudes();
   const Eigen::Map<const Eigen::MatrixXd> Y(memory_.get(), n, p);
   Eigen::VectorXd width = Eigen::Map<const Eigen::VectorXd>(rows.dy, n);
   for (std::size_t j = 0; j < rows.dY.size(); ++j) {
@@ -216,11 +212,7 @@ RowSurvey survey(core::RegressionSource& source, const Box& prior, const std::ve
   result.noisy.assign(p, false);
   result.information = Eigen::MatrixXd::Zero(cols, cols);
   result.moment = Eigen::VectorXd::Zero(cols);
-  Eigen::VectorXd reach(cols);
-  for (Eigen::Index j = 0; j < cols; ++j) {
-    const Interval& side = prior.sides[static_cast<std::size_t>(j)];
-    reach[j] = std::max(std::abs(side.lower), std::abs(side.upper));
-  }
+  const Eigen::VectorXd reach = prior.magnitudes();
   Groups groups(p);
   EvenSample sample(source.outputs(), p);
   std::vector<Eigen::Index> support;

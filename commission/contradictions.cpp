@@ -519,10 +519,7 @@ void weigh_efforts(LogSource& log, const Setting& s, const filter::SignalErrors&
   if (!s.noise_complete || std::ranges::none_of(contradictions, of_efforts)) {
     return;
   }
-  Eigen::VectorXd largest(static_cast<Eigen::Index>(box.sides.size()));
-  for (std::size_t j = 0; j < box.sides.size(); ++j) {
-    largest[static_cast<Eigen::Index>(j)] = core::magnitude(box.sides[j]);
-  }
+  const Eigen::VectorXd largest = box.magnitudes();
   double effort = 0.0, error = 0.0;
   TorqueRows rows = make_rows(log, s, errors);
   core::for_each_block(rows, [&](const RegressionBlock& block) {

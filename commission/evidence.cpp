@@ -72,12 +72,8 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   if (rows.instants() == 0 || bounded.sample != rows.sample) {
     return result;
   }
-  Eigen::VectorXd theta(p), largest(p);
-  for (Eigen::Index j = 0; j < p; ++j) {
-    const Interval& side = box.sides[static_cast<std::size_t>(j)];
-    theta[j] = side.centre();
-    largest[j] = core::magnitude(side);
-  }
+  const std::vector<double> centre = box.centre();
+  const Eigen::VectorXd theta = Eigen::Map<const Eigen::VectorXd>(centre.data(), p), largest = box.magnitudes();
   // Weighted columns of all that is estimated; what is not excited stays out.
   core::RowMatrix A(rows.rows(), p + 1);
   A.leftCols(p) = rows.Y;

@@ -24,12 +24,11 @@ bool cover_untold_outputs(std::vector<OutputNoise>& noise, core::RegressionSourc
     return false;
   }
   const auto n = static_cast<Eigen::Index>(noise.size()), p = static_cast<Eigen::Index>(prior.dimension());
-  Eigen::VectorXd most(p), most_noise = Eigen::VectorXd::Zero(p);
+  const Eigen::VectorXd most = prior.magnitudes();
+  Eigen::VectorXd most_noise = Eigen::VectorXd::Zero(p);
   Eigen::VectorXd largest = Eigen::VectorXd::Zero(n), largest_noise = Eigen::VectorXd::Zero(n);
   std::vector<bool> told(noise.size(), false), moves(noise.size(), false);
   for (Eigen::Index j = 0; j < p; ++j) {
-    const Interval& side = prior.sides[static_cast<std::size_t>(j)];
-    most[j] = std::max(std::abs(side.lower), std::abs(side.upper));
     most_noise[j] = noise_alone[static_cast<std::size_t>(j)] ? most[j] : 0.0;
   }
   core::for_each_block(rows, [&](const RegressionBlock& block) {

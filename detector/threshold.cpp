@@ -21,8 +21,7 @@ ThresholdRule::ThresholdRule(Polytope set, Eigen::VectorXd estimate, ParameterSe
   check::that(estimate_.allFinite(), "estimate", "finite values");
   for (std::size_t j = 0; j < set_.dimension(); ++j) {
     const Interval& side = set_.hull().sides[j];
-    parameters_.push_back({estimate_[static_cast<Eigen::Index>(j)],
-                           std::max(std::abs(side.lower), std::abs(side.upper)),
+    parameters_.push_back({estimate_[static_cast<Eigen::Index>(j)], core::magnitude(side),
                            side.lower >= 0.0   ? 1.0
                            : side.upper <= 0.0 ? -1.0
                                                : 0.0,

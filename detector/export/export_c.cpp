@@ -320,7 +320,7 @@ class Writer {
          list(p, [&](std::size_t j) { return hex(rule_.estimate()[static_cast<Eigen::Index>(j)]); }));
     hull("", rule_);
     line("static const double pfx_largest[PFX_PARAMETERS] = {};",
-         list(p, [&](std::size_t j) { return hex(std::max(std::abs(sides[j].lower), std::abs(sides[j].upper))); }));
+         list(p, [&](std::size_t j) { return hex(core::magnitude(sides[j])); }));
     line("static const double pfx_sign[PFX_PARAMETERS] = {}; /* 0 where it is open */", list(p, [&](std::size_t j) {
            return std::string(sides[j].lower >= 0.0 ? "1.0" : sides[j].upper <= 0.0 ? "-1.0" : "0.0");
          }));

@@ -14,7 +14,6 @@ constexpr double kHidden = 1e-3;      // of a hidden size, relative
 constexpr double kSafe = 1e-12;       // relative, of sums that only tell whether it is worth while to look closer
 constexpr double kNegligible = 1e-9;  // share of the largest size that is as good as 0
 
-double largest_size(const Interval& side) { return std::max(std::abs(side.lower), std::abs(side.upper)); }
 double smallest_size(const Interval& side) { return std::max({0.0, side.lower, -side.upper}); }
 
 // Brackets the place where a function of κ, a quadratic on each of a few pieces, turns positive: f(below) <= 0 and
@@ -85,11 +84,11 @@ FaultMargin::Sums FaultMargin::at(const FaultRow& row, double kappa, double side
     seen_[j] = row.y[j] + side * kappa * row.s[j];
     error_[j] = errors * row.dY[j];
     const Interval side_of = rule_.set().hull().sides[j];
-    doubt += row.range.empty() ? 0.0 : kappa * row.range[j] * largest_size(side_of);
+    doubt += row.range.empty() ? 0.0 : kappa * row.range[j] * core::magnitude(side_of);
     doubt += row.read.empty() ? 0.0 : row.read[j] * side_of.width();
     const double term = seen_[j] * rule_.estimate()[static_cast<Eigen::Index>(j)];
     predicted += term;
-    reach += std::abs(term) + (std::abs(acting_[j]) + std::abs(seen_[j]) + error_[j]) * largest_size(side_of);
+    reach += std::abs(term) + (std::abs(acting_[j]) + std::abs(seen_[j]) + error_[j]) * core::magnitude(side_of);
   }
   // Ten sums of p + 4 terms, here and in the detector: Higham 2002, section 3.1.
   return {predicted, doubt, 10.0 * static_cast<double>(p + 4) * std::numeric_limits<double>::epsilon() * reach};
@@ -115,7 +114,7 @@ bool FaultMargin::cannot_be_possible(const FaultRow& row, double kappa, double s
   for (std::size_t j = 0; j < row.y.size(); ++j) {
     const Interval& theta = rule_.set().hull().sides[j];
     const double by = sign * (row.g1[j] - row.s[j]), by_twice = direction == Direction::up ? row.g2[j] : -row.g2[j];
-    const double most = largest_size(theta);
+    const double most = core::magnitude(theta);
     once += by * (by > 0.0 ? theta.upper : theta.lower) + (row.range.empty() ? 0.0 : row.range[j] * most);
     twice += by_twice * (by_twice > 0.0 ? theta.upper : theta.lower);
     doubt += row.read.empty() ? 0.0 : row.read[j] * theta.width();
@@ -203,7 +202,7 @@ double FaultMargin::largest_hidden(const FaultRow& row, double largest, double s
   double slope = row.doubt;  // of the threshold and of doubt, per unit of κ, at most
   double curvature = 0.0;    // |g2 θ|, at most
   for (std::size_t j = 0; j < row.y.size(); ++j) {
-    const double size = largest_size(rule_.set().hull().sides[j]);
+    const double size = core::magnitude(rule_.set().hull().sides[j]);
     slope += (std::abs(row.s[j]) + (row.range.empty() ? 0.0 : row.range[j])) * size;
     curvature += std::abs(row.g2[j]) * size;
   }

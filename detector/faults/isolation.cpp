@@ -255,7 +255,7 @@ class Search {
     if (!piece) {
       return std::nullopt;
     }
-    const double size = std::max(std::abs(piece->lower), std::abs(piece->upper));
+    const double size = core::magnitude(*piece);
     if (piece->upper - piece->lower <= in_.options.resolution * size || depth >= kHalvings || spent()) {
       return end(*piece);
     }
@@ -274,8 +274,7 @@ class Search {
       }
       const double before = kappa.upper - kappa.lower, now = inner->upper - inner->lower;
       kappa = *inner;
-      if (!(now < kNarrower * before) ||
-          now <= 0.1 * in_.options.resolution * std::max(std::abs(kappa.lower), std::abs(kappa.upper)) || spent()) {
+      if (!(now < kNarrower * before) || now <= 0.1 * in_.options.resolution * core::magnitude(kappa) || spent()) {
         break;
       }
     }
@@ -285,7 +284,7 @@ class Search {
   // Variables: θ, d, A, B and C of every output, as shares of their bounds but for θ.
   std::optional<Interval> program(const Interval& kappa) {
     const double middle = kappa.centre(), eta = core::round_up(std::max(kappa.upper - middle, middle - kappa.lower));
-    const double size = std::max(std::abs(kappa.lower), std::abs(kappa.upper));
+    const double size = core::magnitude(kappa);
     const double reach = free_offset_ ? offset_bound() : eta;
     Box box = in_.set.hull();
     box.sides.push_back({-1.0, 1.0});
@@ -508,12 +507,12 @@ Isolation isolate(const ReferenceMotion& motion, const RegressorFilter& filter, 
   Setting setting{motion, filter, set, options, window_of(motion, filter.design().beta, outside, alarm, options),
                   {},     {},     {}};
   const auto p = static_cast<Eigen::Index>(set.dimension());
-  setting.centre = setting.half = setting.largest = Eigen::VectorXd::Zero(p);
+  setting.centre = setting.half = Eigen::VectorXd::Zero(p);
+  setting.largest = set.hull().magnitudes();
   for (Eigen::Index j = 0; j < p; ++j) {
     const Interval& side = set.hull().sides[static_cast<std::size_t>(j)];
     setting.centre[j] = side.centre();
     setting.half[j] = core::round_up(std::max(side.upper - setting.centre[j], setting.centre[j] - side.lower));
-    setting.largest[j] = std::max(std::abs(side.lower), std::abs(side.upper));
   }
   Isolation isolation;
   isolation.window = {motion.t[setting.window.begin], motion.t[setting.window.end - 1]};

@@ -13,8 +13,6 @@
 namespace wheelwright::detector {
 namespace {
 
-double largest(const Interval& side) { return std::max(std::abs(side.lower), std::abs(side.upper)); }
-
 // Mean of the unit vector while the heading goes from one value to the next at a constant rate.
 Eigen::Vector2d mean_direction(double from, double to) {
   const double half = 0.5 * (to - from), middle = 0.5 * (from + to);
@@ -153,7 +151,7 @@ OdometryFaultRows::OdometryFaultRows(const FaultType& fault, const Model& model,
   most_kappa_ = std::max(std::abs(fault_.kappa(fault_.range.lower)), std::abs(fault_.kappa(fault_.range.upper)));
   const std::size_t gains = measurement_.position ? 2 : 0;
   for (std::size_t w = 0; w < 2; ++w) {
-    radius_[w] = measurement_.position ? largest(hull.sides[w]) : 0.0;
+    radius_[w] = measurement_.position ? core::magnitude(hull.sides[w]) : 0.0;
     yaw_gain_[w] = hull.sides[gains + w];
   }
   const auto n = static_cast<Eigen::Index>(n_), p = static_cast<Eigen::Index>(p_);
@@ -207,7 +205,7 @@ bool OdometryFaultRows::next() {
   }
   sums.slipped += s * h * (signature_.along * e + fault_.lateral * left);
   sums.slipped_turn += s * h * signature_.turning;
-  sums.turn_size += largest(turn);
+  sums.turn_size += core::magnitude(turn);
   sums.moved += s * h * std::hypot(signature_.along, fault_.lateral);
   sums_.push_back(sums);
   ++k_;

@@ -138,10 +138,10 @@ PoseSumDetector::PoseSumDetector(const KinematicModel& model, PoseSumOptions opt
   position_proxy_ = filter::variance_proxy(position_);
   heading_proxy_ = filter::variance_proxy(heading_);
   correlation_ = std::max(risk_.errors.position.correlation, risk_.errors.heading.correlation);
-  largest_ = half_ = Eigen::VectorXd(p);
+  largest_ = risk_.box.magnitudes();
+  half_ = Eigen::VectorXd(p);
   for (Eigen::Index q = 0; q < p; ++q) {
     const Interval& side = risk_.box.sides[static_cast<std::size_t>(q)];
-    largest_[q] = std::max(std::abs(side.lower), std::abs(side.upper));
     half_[q] = std::max({side.upper - model.estimate[q], model.estimate[q] - side.lower, 0.0});
   }
   gains_ = measurement_.position ? 2 : 0;

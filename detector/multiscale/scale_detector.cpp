@@ -109,12 +109,12 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
               "usual variances", "one for each weight and scale");
   inverse_ = core::inverse(m.input * m.input.transpose());
   to_joints_ = m.input.transpose() * inverse_;
-  largest_ = half_ = Eigen::VectorXd(p);
+  largest_ = risk_.box.magnitudes();
+  half_ = Eigen::VectorXd(p);
   Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(joints, n), radius = middle;
   speed_gain_ = Eigen::VectorXd::Zero(n);
   for (Eigen::Index q = 0; q < p; ++q) {
     const Interval& side = risk_.box.sides[static_cast<std::size_t>(q)];
-    largest_[q] = std::max(std::abs(side.lower), std::abs(side.upper));
     half_[q] = std::max(side.upper - model.estimate[q], model.estimate[q] - side.lower);
   }
   for (const Term& term : m.terms) {

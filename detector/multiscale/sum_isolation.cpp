@@ -42,7 +42,7 @@ LookAt between(const LookAt& a, const LookAt& b) {
 
 // True if no size of the interval explains the look.
 bool excludes(const LookAt& look, const Interval& kappa) {
-  const double size = std::max(std::abs(kappa.lower), std::abs(kappa.upper));
+  const double size = core::magnitude(kappa);
   const Interval square{
       kappa.lower <= 0.0 && kappa.upper >= 0.0 ? 0.0 : std::min(kappa.lower * kappa.lower, kappa.upper * kappa.upper),
       size * size};
@@ -61,7 +61,7 @@ std::optional<double> end_of(const std::vector<LookAt>& looks, const Interval& k
   if (excludes(looks, kappa)) {
     return std::nullopt;
   }
-  const double size = std::max(std::abs(kappa.lower), std::abs(kappa.upper));
+  const double size = core::magnitude(kappa);
   if (depth == 0 || kappa.width() <= resolution * size) {
     return side < 0.0 ? kappa.lower : kappa.upper;
   }
@@ -208,8 +208,7 @@ class Narrowing {
       own.radius = row.dy;
       own.doubt = row.doubt;
       for (Eigen::Index q = 0; q < row.range.size(); ++q) {
-        const Interval& side = model_.at_risk->box.sides[static_cast<std::size_t>(q)];
-        own.doubt += row.range[q] * std::max(std::abs(side.lower), std::abs(side.upper));
+        own.doubt += row.range[q] * core::magnitude(model_.at_risk->box.sides[static_cast<std::size_t>(q)]);
       }
       if (held) {  // the effort's own errors do not grow with what it stands at
         own.radius += own.doubt;

@@ -361,11 +361,7 @@ SumResponse::SumResponse(FaultType fault, const OnlineModel& model, const Refere
   effort_gain_ = size_or_zero(fault_.effort, n_) + size_or_zero(fault_.ground, n_);
   spread_ = model.model.input.cwiseAbs() * core::pseudo_inverse(model.model.input).cwiseAbs();
   most_kappa_ = std::max(std::abs(fault_.kappa(fault_.range.lower)), std::abs(fault_.kappa(fault_.range.upper)));
-  largest_ = Eigen::VectorXd(p_);
-  for (Eigen::Index q = 0; q < p_; ++q) {
-    const Interval& side = model.at_risk->box.sides[static_cast<std::size_t>(q)];
-    largest_[q] = std::max(std::abs(side.lower), std::abs(side.upper));
-  }
+  largest_ = model.at_risk->box.magnitudes();
   signals_ = Eigen::MatrixXd::Zero(n_, columns_);
   q_ = Eigen::ArrayXXd::Zero(W_, columns_);
   shared_.assign(drive.scales.size(), KernelSums(W_, columns_));
