@@ -106,11 +106,11 @@ std::string odometry_in(const logs::LogReport& report) {
 /// Speeds beside angles, by central differences, for the search of the geometry.
 void add_speeds(LogTable& log) {
   for (const std::string side : {"r", "l"}) {
-    const auto angle = std::ranges::find(log.names, "phi_" + side);
-    if (angle == log.names.end() || std::ranges::count(log.names, "omega_" + side) > 0) {
+    const std::vector<double>* const angle = log.find("phi_" + side);
+    if (angle == nullptr || log.find("omega_" + side) != nullptr) {
       continue;
     }
-    const std::vector<double>& phi = log.columns[static_cast<std::size_t>(angle - log.names.begin())];
+    const std::vector<double>& phi = *angle;
     std::vector<double> omega(phi.size(), 0.0);
     for (std::size_t k = 1; k + 1 < phi.size(); ++k) {
       const double h = log.t[k + 1] - log.t[k - 1];
@@ -136,7 +136,7 @@ void geometry_from_log(const Arguments& a, RobotWithOrigins& made) {
   }
   LogTable table = first_rows(*log, kExaminedRows);
   add_speeds(table);
-  const auto has = [&](const char* name) { return std::ranges::count(table.names, name) > 0; };
+  const auto has = [&](const char* name) { return table.find(name) != nullptr; };
   const std::string wanted =
       "expected --urdf FILE, or --wheel-radius and --track-width: neither a robot description nor a pose in the log "
       "gives them";

@@ -19,12 +19,16 @@ std::optional<std::size_t> LogSource::find(std::string_view name) const {
   return static_cast<std::size_t>(it - names.begin());
 }
 
+const std::vector<double>* LogTable::find(std::string_view name) const {
+  const auto at = std::ranges::find(names, name);
+  return at == names.end() ? nullptr : &columns[static_cast<std::size_t>(at - names.begin())];
+}
+
 const std::vector<double>& LogTable::column(std::string_view name) const {
-  const auto it = std::find(names.begin(), names.end(), name);
-  if (it == names.end()) {
-    throw InvalidArgument("log: no column '" + std::string(name) + "'");
+  if (const std::vector<double>* found = find(name)) {
+    return *found;
   }
-  return columns[static_cast<std::size_t>(it - names.begin())];
+  throw InvalidArgument("log: no column '" + std::string(name) + "'");
 }
 
 std::vector<double>& LogTable::column(std::string_view name) {

@@ -58,6 +58,8 @@ struct LogTable {
 
   /// Number of rows.
   [[nodiscard]] std::size_t rows() const { return t.size(); }
+  /// The column called `name`, or null.
+  [[nodiscard]] const std::vector<double>* find(std::string_view name) const;
   /// The column called `name`. Throws InvalidArgument where there is none.
   [[nodiscard]] const std::vector<double>& column(std::string_view name) const;
   /// The same, to be written.

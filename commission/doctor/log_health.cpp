@@ -438,25 +438,19 @@ namespace {
 constexpr std::size_t kHalfWindow = 5;  // rows to each side for a smooth speed
 constexpr double kMoves = 0.05;         // of the top speed
 
-bool has(const LogTable& log, const std::string& name) { return std::ranges::count(log.names, name) > 0; }
-
-const std::vector<double>* column_of(const LogTable& log, const std::string& name) {
-  const auto at = std::ranges::find(log.names, name);
-  return at == log.names.end() ? nullptr : &log.columns[static_cast<std::size_t>(at - log.names.begin())];
-}
-
 // Geometry one: excitation does not depend on it.
 Robot stand_in(const LogTable& log) {
   Robot robot;
   robot.name = "unknown";
-  const bool wheels = has(log, "omega_r") || has(log, "omega_l") || has(log, "phi_r") || has(log, "phi_l");
-  if (!wheels && (has(log, "position") || has(log, "velocity"))) {
+  const auto has = [&](const char* name) { return log.find(name) != nullptr; };
+  const bool wheels = has("omega_r") || has("omega_l") || has("phi_r") || has("phi_l");
+  if (!wheels && (has("position") || has("velocity"))) {
     robot.model = "single_axis";
     return robot;
   }
   robot.wheel_radius = 1.0;
   robot.track_width = 2.0;
-  const auto both = [&](const char* right, const char* left) { return has(log, right) && has(log, left); };
+  const auto both = [&](const char* right, const char* left) { return has(right) && has(left); };
   robot.effort = both("tau_r", "tau_l")           ? EffortKind::torque
                  : both("current_r", "current_l") ? EffortKind::current
                  : both("voltage_r", "voltage_l") ? EffortKind::voltage
@@ -496,7 +490,7 @@ double top_of(std::vector<double> values) {
 
 }  // namespace
 
-const std::vector<double>* HealthView::column(const std::string& name) const { return column_of(*log, name); }
+const std::vector<double>* HealthView::column(const std::string& name) const { return log->find(name); }
 
 bool HealthView::has_motion() const {
   return std::ranges::all_of(joints, [](const JointView& j) { return j.angle != nullptr; }) ||

@@ -328,7 +328,7 @@ void find_shapes(LogSource& log, const commission::Setting& s, const commission:
 // Adds wheel speeds where there are angles in their place: the mean speed from the sample before to the one behind.
 void add_speeds(LogTable& log) {
   for (const auto& [speed, angle] : {std::pair("omega_r", "phi_r"), std::pair("omega_l", "phi_l")}) {
-    if (std::ranges::find(log.names, speed) != log.names.end()) {
+    if (log.find(speed) != nullptr) {
       continue;
     }
     const std::vector<double>& phi = log.column(angle);

@@ -496,10 +496,7 @@ Spread spread_of(const Fit& fit, const Fit::Information& info) {
 
 KinematicCalibration calibrate_kinematics(const LogTable& log, const KinematicOptions& options) {
   validate(options);
-  const auto has = [&](const char* name) {
-    return std::find(log.names.begin(), log.names.end(), name) != log.names.end();
-  };
-  const bool position = has("x") && has("y");
+  const bool position = log.find("x") != nullptr && log.find("y") != nullptr;
   KinematicCalibration result;
   std::vector<Window> windows = cut(log, options, position, result);
   result.windows = windows.size();
