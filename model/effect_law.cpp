@@ -46,12 +46,12 @@ using Constants = std::array<double, 2>;
 
 constexpr double unknown_mass = 1e6;  // kg
 
-double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double>(x < 0.0); }
-
 bool in_doubt(double x, double error) { return error > 0.0 && std::abs(x) <= error; }
 
 // sgn x; any number in [−1, 1] where it is in doubt.
-TermValue sign_of(double x, double error) { return in_doubt(x, error) ? TermValue{0.0, 1.0} : TermValue{sign(x), 0.0}; }
+TermValue sign_of(double x, double error) {
+  return in_doubt(x, error) ? TermValue{0.0, 1.0} : TermValue{core::sign(x), 0.0};
+}
 
 // constants: joint.
 TermValue dry(const MotionState& s, const Constants& constants) {
@@ -63,7 +63,7 @@ TermValue dry(const MotionState& s, const Constants& constants) {
 TermValue stribeck(const MotionState& s, const Constants& constants) {
   const auto j = static_cast<std::size_t>(constants[0]);
   const double w = s.joint_speed[j], error = s.joint_error[j], x = w / constants[1];
-  const double value = std::exp(-x * x) * sign(w);
+  const double value = std::exp(-x * x) * core::sign(w);
   const double smooth = std::min(1.0, std::sqrt(2.0 / std::numbers::e) * error / constants[1]);
   return in_doubt(w, error) ? TermValue{0.0, 1.0} : TermValue{value, smooth};
 }

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "core/check.hpp"
+#include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
 
@@ -42,8 +43,8 @@ struct Columns {
 };
 
 Series optional_column(const LogTable& log, std::string_view name) {
-  const auto found = std::ranges::find(log.names, name);
-  return found == log.names.end() ? Series{} : log.columns[static_cast<std::size_t>(found - log.names.begin())];
+  const std::vector<double>* const found = log.find(name);
+  return found == nullptr ? Series{} : *found;
 }
 
 Columns take(const LogTable& log, const Measurement& measurement) {
@@ -92,8 +93,6 @@ void unwrap(Series& angle) {
     before = now;
   }
 }
-
-double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double>(x < 0.0); }
 
 // Angles at the samples become mean speeds between them; everything else its mean between them.
 void to_middles(Series& t, Columns& columns, std::vector<Series>& angle, bool held) {
@@ -267,7 +266,7 @@ void append_segment(Drive& drive, Series t, Columns columns, const Measurement& 
       const Series& motion = columns.motion[j];
       for (std::size_t k = 0; k < rows; ++k) {
         const double direction = angles ? (k > 0 ? motion[k] - motion[k - 1] : 0.0) : motion[k];
-        columns.effort[j][k] = std::abs(columns.effort[j][k]) * sign(direction);
+        columns.effort[j][k] = std::abs(columns.effort[j][k]) * core::sign(direction);
       }
     }
   }

@@ -14,8 +14,6 @@ namespace {
 
 constexpr double kAlike = 0.05;  // relative: steps alike enough for a parabola through past efforts
 
-double sign(double x) { return static_cast<double>(x > 0.0) - static_cast<double>(x < 0.0); }
-
 // result = |matrix| · x.
 void multiply_sizes(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
   multiply(matrix, x, result, [](double number) { return std::abs(number); });
@@ -113,7 +111,7 @@ void ElementFilter::read_effort(Sample& now, std::span<const double> sample) {
     if (measurement_.effort_unsigned) {
       const bool angle = measurement_.motion == MotionKind::angle;
       const double moved = !angle ? now.joint[i] : samples_ > 1 ? now.joint[i] - before.joint[i] : 0.0;
-      now.effort[i] = std::abs(value) * sign(moved);
+      now.effort[i] = std::abs(value) * core::sign(moved);
     } else {
       now.effort[i] = value;
     }
