@@ -4,8 +4,6 @@
 namespace wheelwright::core {
 namespace {
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
 // The digits from `at` on without zeros in front; `at` moves behind them.
 std::string_view take_number(std::string_view text, std::size_t& at) {
   while (at < text.size() && text[at] == '0') {

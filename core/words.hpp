@@ -9,6 +9,9 @@
 
 namespace wheelwright::core {
 
+/// Whether `c` is one of 0 to 9.
+[[nodiscard]] constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
 /// "a, b, c", or with `between` in place of ", ".
 [[nodiscard]] std::string listed(const std::vector<std::string>& words, std::string_view between = ", ");
 

@@ -11,14 +11,14 @@
 
 #include <fmt/format.h>
 
+#include "core/words.hpp"
+
 namespace wheelwright::files {
 namespace {
 
 constexpr std::array<double, 23> powers_of_ten = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                                   1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
                                                   1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
-
-bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; }
 
 /// Whether the decimal number in [first, last), known to be out of range, is too large and not too small: its leading
 /// non-zero digit stands at 10^k with k > 0.
@@ -66,14 +66,14 @@ const char* parse_number(const char* first, const char* last, double& value) {
   }
   const char* const digits = p;
   std::uint64_t mantissa = 0;
-  for (; p != last && is_digit(*p); ++p) {
+  for (; p != last && core::is_digit(*p); ++p) {
     mantissa = 10 * mantissa + static_cast<std::uint64_t>(*p - '0');
   }
   std::ptrdiff_t count = p - digits;
   std::ptrdiff_t exponent = 0;
   if (p != last && *p == '.') {
     const char* const fraction = ++p;
-    for (; p != last && is_digit(*p); ++p) {
+    for (; p != last && core::is_digit(*p); ++p) {
       mantissa = 10 * mantissa + static_cast<std::uint64_t>(*p - '0');
     }
     exponent = fraction - p;
@@ -90,7 +90,7 @@ const char* parse_number(const char* first, const char* last, double& value) {
     }
     const char* const power = q;
     int shift = 0;
-    for (; q != last && is_digit(*q) && q - power < 4; ++q) {
+    for (; q != last && core::is_digit(*q) && q - power < 4; ++q) {
       shift = 10 * shift + (*q - '0');
     }
     if (q == power || q - power == 4) {

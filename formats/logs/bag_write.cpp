@@ -17,6 +17,7 @@
 
 #include "core/check.hpp"
 #include "core/error.hpp"
+#include "core/words.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/logs/bag_files.hpp"
 #include "formats/logs/database.hpp"
@@ -43,7 +44,6 @@ void put(Cdr& to, const RosPose& pose) { to << pose.position << pose.orientation
 void put(Cdr& to, const RosTwist& twist) { to << twist.linear << twist.angular; }
 
 bool lower(char c) { return c >= 'a' && c <= 'z'; }
-bool digit(char c) { return c >= '0' && c <= '9'; }
 
 }  // namespace
 
@@ -139,7 +139,7 @@ std::string ros_field_name(std::string_view name) {
   std::string out;
   for (const char c : name) {
     const char small = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    if (lower(small) || digit(small)) {
+    if (lower(small) || core::is_digit(small)) {
       out += small;
     } else if (!out.empty() && out.back() != '_') {
       out += '_';

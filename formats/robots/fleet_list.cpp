@@ -26,8 +26,6 @@ namespace fs = std::filesystem;
 
 const std::vector<std::string> kColumns = {"robot", "log", "when", "robot_file", "role"};
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
 // A row of a list as it was read.
 struct ListRow {
   std::size_t line = 0;
@@ -243,11 +241,11 @@ std::vector<fs::path> entries_of(const fs::path& directory) {
 // The first date in a name.
 std::optional<double> date_in(const std::string& name) {
   for (std::size_t at = 0; at < name.size(); ++at) {
-    if (!is_digit(name[at]) || (at > 0 && is_digit(name[at - 1]))) {
+    if (!core::is_digit(name[at]) || (at > 0 && core::is_digit(name[at - 1]))) {
       continue;
     }
     for (const std::size_t length : {std::size_t{10}, std::size_t{8}}) {
-      const bool ends = at + length >= name.size() || !is_digit(name[at + length]);
+      const bool ends = at + length >= name.size() || !core::is_digit(name[at + length]);
       if (at + length <= name.size() && ends) {
         if (const auto date = days_of_date(std::string_view(name).substr(at, length))) {
           return date;
@@ -332,7 +330,7 @@ std::optional<double> days_of_date(std::string_view text) {
     if (dashes && (i == 4 || i == 7)) {
       continue;
     }
-    if (!is_digit(text[i])) {
+    if (!core::is_digit(text[i])) {
       return std::nullopt;
     }
     digits += text[i];
