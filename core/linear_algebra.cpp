@@ -5,6 +5,10 @@
 
 namespace wheelwright::core {
 
+double rms(const Eigen::VectorXd& signal) {
+  return signal.size() > 0 ? std::sqrt(signal.squaredNorm() / static_cast<double>(signal.size())) : 0.0;
+}
+
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& square) { return square.inverse(); }
 
 Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& A) { return A.completeOrthogonalDecomposition().pseudoInverse(); }

@@ -15,6 +15,9 @@
 
 namespace wheelwright::core {
 
+/// Root mean square of the entries; 0 where there are none.
+[[nodiscard]] double rms(const Eigen::VectorXd& signal);
+
 /// Eigenvalues in ascending order and their eigenvectors, one a column.
 struct EigenPairs {
   Eigen::VectorXd values;

@@ -92,8 +92,7 @@ NoiseFloor floor_of(const std::vector<Eigen::VectorXd>& left, const GapRows& row
   NoiseFloor floor;
   std::vector<double> efforts;
   for (std::size_t s = 0; s < left.size(); ++s) {
-    const double rms =
-        left[s].size() > 0 ? std::sqrt(left[s].squaredNorm() / static_cast<double>(left[s].size())) : 0.0;
+    const double rms = core::rms(left[s]);
     const std::string& name = rows.spaces[s].name;
     if (rows.kinds[s] == GapSpace::dynamic) {
       efforts.push_back(rms);

@@ -304,10 +304,6 @@ class Imitator {
   Eigen::VectorXd left_;
 };
 
-double rms(const Eigen::VectorXd& signal) {
-  return signal.size() > 0 ? std::sqrt(signal.squaredNorm() / static_cast<double>(signal.size())) : 0.0;
-}
-
 // The size at which a column asks for `share` of what there is.
 double size_for(const Column& column, const Drive& drive, double share) {
   Eigen::MatrixXd effort = Eigen::MatrixXd::Zero(drive.rows(), static_cast<Eigen::Index>(drive.model.n()));
@@ -319,11 +315,11 @@ double size_for(const Column& column, const Drive& drive, double share) {
   if (const double asked = effort.norm(); asked > 0.0) {
     return share * (base * drive.model.input.transpose()).norm() / asked;
   }
-  const double moved = std::hypot(rms(column.forward), rms(column.lateral)), turned = rms(column.yaw);
+  const double moved = std::hypot(core::rms(column.forward), core::rms(column.lateral)), turned = core::rms(column.yaw);
   if (moved > 0.0) {
-    return share * rms(drive.coordinates[0].speed) / moved;
+    return share * core::rms(drive.coordinates[0].speed) / moved;
   }
-  return turned > 0.0 ? share * rms(drive.coordinates.back().speed) / turned : 1.0;
+  return turned > 0.0 ? share * core::rms(drive.coordinates.back().speed) / turned : 1.0;
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "core/check.hpp"
 #include "core/error.hpp"
 #include "core/for_all.hpp"
+#include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
 #include "gap/rows/drive.hpp"
 
@@ -79,10 +80,6 @@ WhiteNoise noise_of(const Drive& drive, const Signal& signal) {
     return {};
   }
   return {core::median(std::move(size)) / (0.6744897501960817 * std::sqrt(20.0)), resolution / std::sqrt(12.0)};
-}
-
-double rms_of(const Signal& signal) {
-  return signal.size() > 0 ? std::sqrt(signal.squaredNorm() / static_cast<double>(signal.size())) : 0.0;
 }
 
 }  // namespace
@@ -176,7 +173,7 @@ IncrementNoise repeatability(const Drive& drive, const Windows& windows, const I
     Eigen::Index row = 0;
     for (const std::size_t c : {0, 1}) {
       const Signal& v = drive.coordinates[c].smooth_speed;
-      const double unit = std::max(rms_of(v), 1e-12);
+      const double unit = std::max(core::rms(v), 1e-12);
       for (const auto* place : {&windows.first, &windows.middle, &windows.last}) {
         motion(row++, k) = v[(*place)[at]] / unit;
       }
