@@ -10,12 +10,6 @@
 
 namespace wheelwright::app {
 using namespace words;
-namespace {
-
-// "1" is no unit to be read.
-std::string shown_unit(const std::string& unit) { return unit == "1" ? "" : unit; }
-
-}  // namespace
 
 std::string check_report(const results::ModelCheck& check, const results::ModelClaims& claims,
                          const results::CheckedFiles& files, const std::string& software) {
@@ -24,7 +18,7 @@ std::string check_report(const results::ModelCheck& check, const results::ModelC
                                 const std::vector<std::string>& units, const auto& origin) {
     std::vector<std::vector<Cell>> rows;
     for (const results::BoundVerdict& each : verdicts) {
-      const std::string unit = shown_unit(units[each.parameter]);
+      const std::string unit = unit_of(units[each.parameter]);
       rows.push_back({escape(spaced(set.parameter_names[each.parameter])),
                       each.side == bounds::Side::upper ? "at most" : "at least",
                       numeric(escape(unit.empty() ? fmt::format("{:.7g}", each.stated)

@@ -17,9 +17,6 @@ const PublishedBound& claim_of(const BoundVerdict& verdict, const SetClaims& cla
   return (verdict.side == bounds::Side::upper ? claims.upper : claims.lower)[verdict.parameter];
 }
 
-// "1" is no unit to be read.
-std::string shown_unit(const std::string& unit) { return unit == "1" ? "" : unit; }
-
 // A line for each bound.
 std::string bound_lines(const std::vector<BoundVerdict>& verdicts, const SetClaims& claims,
                         const std::vector<std::string>& units,
@@ -29,7 +26,7 @@ std::string bound_lines(const std::vector<BoundVerdict>& verdicts, const SetClai
   for (const BoundVerdict& each : verdicts) {
     const std::string statement =
         fmt::format("{} {} {:.7g} {}", claims.parameter_names[each.parameter],
-                    each.side == bounds::Side::upper ? "<=" : ">=", each.stated, shown_unit(units[each.parameter]));
+                    each.side == bounds::Side::upper ? "<=" : ">=", each.stated, words::unit_of(units[each.parameter]));
     text +=
         fmt::format("  {:<{}} {:<10}   {}\n", statement, width, each.proved ? "proved" : "NOT PROVED", stands(each));
   }

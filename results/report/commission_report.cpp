@@ -85,7 +85,7 @@ std::string kinematic_section(const commission::KinematicCommissioning& k) {
   out += warrant_note(k.model->warrant);
   std::vector<std::vector<Cell>> rows;
   for (const commission::KinematicParameter& p : k.parameters) {
-    const std::string unit = p.unit == "1" ? "" : p.unit;
+    const std::string unit = unit_of(p.unit);
     rows.push_back({escape(p.name), numeric(p.estimate ? number(*p.estimate, 5) : "–"), numeric(number(p.lower, 5)),
                     numeric(number(p.upper, 5)), numeric(number(p.nominal, 5)), escape(unit)});
   }

@@ -381,7 +381,7 @@ std::string pose_at_risk(const Commissioning& result) {
   for (std::size_t j = 0; j < names.size(); ++j) {
     const Interval side = model.at_risk->box.sides[j];
     const auto [lower, upper] = outward(side.lower, side.upper);
-    items.push_back(with_unit(names[j] + " " + lower + " to " + upper, units[j] == "1" ? "" : units[j]));
+    items.push_back(with_unit(names[j] + " " + lower + " to " + upper, unit_of(units[j])));
   }
   std::ranges::for_each(items, [](std::string& item) { std::ranges::replace(item, '_', ' '); });
   return fmt::format("Of the pose, at a risk of {:g}: {}.", model.at_risk->risk, core::enumerated(items));

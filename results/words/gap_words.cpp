@@ -184,7 +184,7 @@ std::string effect_nouns(const std::vector<std::string>& effects) {
 }
 
 std::string estimate_words(const gap::GapEstimate& e) {
-  const std::string unit = e.unit == "1" ? "" : e.unit;
+  const std::string unit = unit_of(e.unit);
   if (!std::isfinite(e.lower) || !std::isfinite(e.upper)) {
     return with_unit(number(e.estimate), unit);
   }

@@ -211,7 +211,7 @@ std::string figures_words(const std::vector<gap::ShrinkFigure>& figures, const s
       continue;
     }
     out += fmt::format("  {:<38} {:>9} → {:>9} {}{}\n", what + ", " + words::spaced(f.name), words::number(f.before),
-                       words::number(f.after), f.unit == "1" ? "" : f.unit,
+                       words::number(f.after), words::unit_of(f.unit),
                        f.floor > 0.0 ? ", floor " + words::number(f.floor) : "");
   }
   return out;
