@@ -25,34 +25,29 @@ using commission::DetectorChoice;
 // Size over β of candidates that decide at once, a mark for each: squares of order 1, circles of order 2.
 std::string curve(const DetectorChoice& choice) {
   std::vector<const DetectorCandidate*> shown;
-  Range beta, size;
+  constexpr double width = 560.0, height = 260.0, left = 62.0, right = width - 14.0, top = 14.0, bottom = height - 44.0;
+  Axis x{left, right};
+  Range size;
   for (const DetectorCandidate& each : choice.candidates) {
     if (std::isfinite(each.size) && each.size > 0.0 && each.persistence.n == 1) {
       shown.push_back(&each);
-      beta.take(std::log10(each.filter.beta));
+      x.take(std::log10(each.filter.beta));
       size.take(std::log10(each.size));
     }
   }
-  if (shown.size() < 2 || !(beta.low < beta.high)) {
+  if (shown.size() < 2 || !(x.low < x.high)) {
     return "";
   }
-  constexpr double width = 560.0, height = 260.0, left = 62.0, right = width - 14.0, top = 14.0, bottom = height - 44.0;
-  const double margin = 0.05 * (beta.high - beta.low), room = std::max(0.1 * (size.high - size.low), 0.02);
-  const auto x = [&](double of) {
-    return left + (right - left) * (of - beta.low + margin) / (beta.high - beta.low + 2.0 * margin);
-  };
-  const auto y = [&](double of) {
-    return bottom - (bottom - top) * (of - size.low + room) / (size.high - size.low + 2.0 * room);
-  };
+  x.pad(0.05);
+  const double room = std::max(0.1 * (size.high - size.low), 0.02);
+  const Axis y{{size.low - room, size.high + room}, bottom, top};
   std::string out = open_svg(width, height, "largest certain size over the stated one, for each candidate filter");
-  for (const double tick :
-       logarithmic_ticks(std::pow(10.0, beta.low - margin), std::pow(10.0, beta.high + margin), true)) {
+  for (const double tick : logarithmic_ticks(std::pow(10.0, x.low), std::pow(10.0, x.high), true)) {
     const double at = x(std::log10(tick));
     out += fmt::format("<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/>", at, top, bottom) +
            svg_text(at, bottom + 15.0, "middle", number(tick, 1));
   }
-  std::vector<double> sizes =
-      logarithmic_ticks(std::pow(10.0, size.low - room), std::pow(10.0, size.high + room), true);
+  std::vector<double> sizes = logarithmic_ticks(std::pow(10.0, y.low), std::pow(10.0, y.high), true);
   if (sizes.size() < 3) {
     sizes = {std::pow(10.0, size.low), std::pow(10.0, 0.5 * (size.low + size.high)), std::pow(10.0, size.high)};
   }

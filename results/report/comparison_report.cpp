@@ -23,13 +23,12 @@ using commission::SetComparison;
 // The intervals of a parameter in both sets on one scale, one above the other.
 std::string bars(const ParameterChange& parameter) {
   constexpr double width = 330.0, left = 62.0, right = width - 8.0;
-  Range range;
+  Axis at{left, right};
   for (const Interval& side : {parameter.before, parameter.after}) {
-    range.take(side.lower);
-    range.take(side.upper);
+    at.take(side.lower);
+    at.take(side.upper);
   }
-  const double span = range.high > range.low ? range.high - range.low : 1.0;
-  const auto at = [&](double x) { return left + (right - left) * (x - range.low) / span; };
+  at.high = at.high > at.low ? at.high : at.low + 1.0;
   std::string out = open_svg(width, 48.0, "intervals of " + parameter.quantity + " before and after");
   double y = 14.0;
   for (const auto& [name, side] : {std::pair("before", parameter.before), std::pair("after", parameter.after)}) {

@@ -237,14 +237,6 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
 
 namespace {
 
-// A logarithmic axis.
-struct MarginAxis {
-  double low, high, from, to;
-  [[nodiscard]] double operator()(double x) const {
-    return from + (to - from) * std::log(x / low) / std::log(high / low);
-  }
-};
-
 constexpr std::array kDashes = {"", "7 4", "2 3", "9 3 2 3", "4 3"};
 constexpr std::array kColours = {"--first", "--second", "--third", "--ink", "--caution"};
 
@@ -253,8 +245,8 @@ struct Curve {
   std::vector<std::pair<double, double>> median, worst;
 };
 
-std::string path(const std::vector<std::pair<double, double>>& points, const MarginAxis& x, const MarginAxis& y,
-                 std::size_t style, double width) {
+std::string path(const std::vector<std::pair<double, double>>& points, const Axis& x, const Axis& y, std::size_t style,
+                 double width) {
   std::string d;
   for (const auto& [at, size] : points) {
     d += fmt::format("{}{:.1f} {:.1f}", d.empty() ? "M" : " L", x(at), y(size));
@@ -262,10 +254,6 @@ std::string path(const std::vector<std::pair<double, double>>& points, const Mar
   return fmt::format("<path d=\"{}\" style=\"fill:none;stroke:var({});stroke-width:{};stroke-dasharray:{}\"/>", d,
                      kColours[style], width, *kDashes[style] != '\0' ? kDashes[style] : "none");
 }
-
-}  // namespace
-
-namespace {
 
 // Smallest certain sizes over the delay, of some onsets.
 Curve curve_of(const std::string& label, const detector::FaultMargins& margins, const std::vector<double>& windows,
@@ -300,8 +288,8 @@ std::string chart_of(const std::vector<Curve>& curves, const model::FaultType& f
   }
   constexpr double width = 520.0, height = 260.0, left = 70.0, right = 170.0, top = 10.0, bottom = 40.0;
   const double scale = fault.unit == "1" ? 100.0 : 1.0;
-  const MarginAxis x{from, to, left, width - right};
-  const MarginAxis y{scale * low / 1.1, scale * high * 1.1, height - bottom, top};
+  const Axis x{{from, to}, left, width - right, true};
+  const Axis y{{scale * low / 1.1, scale * high * 1.1}, height - bottom, top, true};
   std::string out = fmt::format(
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"smallest certain size over "
       "delay\">",

@@ -54,26 +54,41 @@ std::vector<double> logarithmic_ticks(double low, double high, bool fine) {
   return out;
 }
 
-namespace {
-
-void pad(Range& range, double share) {
-  if (!(range.low <= range.high)) {
-    range = {0.0, 1.0};
+void Axis::pad(double share) {
+  if (empty()) {
+    low = 0.0;
+    high = 1.0;
   }
-  const double margin = range.high > range.low ? share * (range.high - range.low)
-                                               : (range.high != 0.0 ? 0.1 * std::abs(range.high) : 1.0);
-  range.low -= margin;
-  range.high += margin;
+  const double margin = high > low ? share * (high - low) : (high != 0.0 ? 0.1 * std::abs(high) : 1.0);
+  low -= margin;
+  high += margin;
 }
 
-// Linear map of a range to pixels.
-struct Scale {
-  Range range;
-  double from = 0.0, to = 1.0;
-  [[nodiscard]] double operator()(double x) const {
-    return from + (to - from) * (x - range.low) / (range.high - range.low);
+double Axis::operator()(double x) const {
+  return logarithmic ? from + (to - from) * std::log(x / low) / std::log(high / low)
+                     : from + (to - from) * (x - low) / (high - low);
+}
+
+double Axis::inside(double x) const { return (*this)(std::clamp(x, low, high)); }
+
+std::vector<double> Axis::ticks() const {
+  if (logarithmic) {
+    return logarithmic_ticks(low, high, high / low < 300.0);
   }
-};
+  std::vector<double> out;
+  const double rough = (high - low) / 5.0, power = std::pow(10.0, std::floor(std::log10(rough)));
+  const double step = power * (rough < 1.5 * power   ? 1.0
+                               : rough < 3.5 * power ? 2.0
+                               : rough < 7.5 * power ? 5.0
+                                                     : 10.0);
+  const double first = std::ceil(low / step);
+  for (int k = 0; k < 12 && (first + k) * step <= high; ++k) {
+    out.push_back((first + k) * step);
+  }
+  return out;
+}
+
+namespace {
 
 // A tip at (x, y) that points right (direction 1) or left (−1).
 std::string arrow(double x, double y, double direction) {
@@ -85,32 +100,31 @@ std::string arrow(double x, double y, double direction) {
 
 std::string interval_bar(const ParameterView& v) {
   constexpr double width = 230.0, height = 34.0, middle = 15.0, left = 10.0, right = width - 10.0;
-  Range range;
+  Axis scale{left, right};
   if (v.has_set && !v.lower_is_prior) {
-    range.take(v.lower);
+    scale.take(v.lower);
   }
   if (v.has_set && !v.upper_is_prior) {
-    range.take(v.upper);
+    scale.take(v.upper);
   }
   if (v.estimate) {
-    range.take(*v.estimate);
-    range.take(*v.estimate - v.spread.value_or(0.0));
-    range.take(*v.estimate + v.spread.value_or(0.0));
+    scale.take(*v.estimate);
+    scale.take(*v.estimate - v.spread.value_or(0.0));
+    scale.take(*v.estimate + v.spread.value_or(0.0));
   }
   if (v.nominal) {
-    range.take(*v.nominal);
+    scale.take(*v.nominal);
   }
-  const double span = range.low < range.high ? range.high - range.low : std::numeric_limits<double>::infinity();
+  const double span = scale.low < scale.high ? scale.high - scale.low : std::numeric_limits<double>::infinity();
   for (const double bound : {v.lower, v.upper}) {
-    if (v.has_set && bound >= range.low - span && bound <= range.high + span) {
-      range.take(bound);
+    if (v.has_set && bound >= scale.low - span && bound <= scale.high + span) {
+      scale.take(bound);
     }
   }
-  pad(range, 0.12);
-  const Scale scale{range, left, right};
-  const bool beyond_left = v.lower<range.low, beyond_right = v.upper> range.high;
-  const double x0 = scale(std::clamp(v.lower, range.low, range.high));
-  const double x1 = scale(std::clamp(v.upper, range.low, range.high));
+  scale.pad(0.12);
+  const bool beyond_left = v.lower<scale.low, beyond_right = v.upper> scale.high;
+  const double x0 = scale(std::clamp(v.lower, scale.low, scale.high));
+  const double x1 = scale(std::clamp(v.upper, scale.low, scale.high));
   std::string out = fmt::format(
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" "
       "aria-label=\"intervals of {2}\"><line class=\"axis\" x1=\"{3}\" x2=\"{4}\" y1=\"{5}\" "
@@ -133,7 +147,7 @@ std::string interval_bar(const ParameterView& v) {
                        scale(*v.estimate - s), scale(*v.estimate + s), middle - 3.0, middle);
     out += fmt::format("<circle class=\"point\" cx=\"{:.1f}\" cy=\"{}\" r=\"2.6\"/>", scale(*v.estimate), middle);
   }
-  if (v.has_set && !(v.lower_is_prior && v.upper_is_prior) && v.centre >= range.low && v.centre <= range.high) {
+  if (v.has_set && !(v.lower_is_prior && v.upper_is_prior) && v.centre >= scale.low && v.centre <= scale.high) {
     out += fmt::format("<circle class=\"centre\" cx=\"{:.1f}\" cy=\"{}\" r=\"4.2\"/>", scale(v.centre), middle);
   }
   return out + "</svg>";
@@ -151,13 +165,13 @@ std::string filter_curve(const commission::FilterChoice& choice) {
   }
   std::sort(points.begin(), points.end());
   constexpr double width = 520.0, height = 230.0;
-  Scale x{{}, 62.0, width - 14.0}, y{{}, height - 40.0, 14.0};
+  Axis x{62.0, width - 14.0}, y{height - 40.0, 14.0};
   for (const auto& [b, c] : points) {
-    x.range.take(b);
-    y.range.take(c);
+    x.take(b);
+    y.take(c);
   }
-  pad(x.range, 0.05);
-  pad(y.range, 0.1);
+  x.pad(0.05);
+  y.pad(0.1);
   std::string out = fmt::format(
       "<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" "
       "aria-label=\"residual over torque for each candidate filter\">",
@@ -167,13 +181,13 @@ std::string filter_curve(const commission::FilterChoice& choice) {
     for (int e = -9; e <= 9; ++e) {
       const double at = std::log10(m) + e;
       const std::string label = number(m * std::pow(10.0, e), 1);
-      if (at > x.range.low && at < x.range.high) {
+      if (at > x.low && at < x.high) {
         out += fmt::format(
             "<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"14\" y2=\"{1}\"/><text x=\"{0:.1f}\" "
             "y=\"{2}\" text-anchor=\"middle\">{3}</text>",
             x(at), height - 40.0, height - 25.0, label);
       }
-      if (at > y.range.low && at < y.range.high) {
+      if (at > y.low && at < y.high) {
         out += fmt::format(
             "<line class=\"axis\" x1=\"62\" x2=\"{1}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\"/><text x=\"57\" "
             "y=\"{2:.1f}\" text-anchor=\"end\">{3}</text>",
@@ -204,13 +218,7 @@ std::string filter_curve(const commission::FilterChoice& choice) {
 }
 
 std::string driven_path(const LogTable& signals) {
-  const auto column = [&](std::string_view name) -> const std::vector<double>* {
-    const auto found = std::find(signals.names.begin(), signals.names.end(), name);
-    return found == signals.names.end() ? nullptr
-                                        : &signals.columns[static_cast<std::size_t>(found - signals.names.begin())];
-  };
-  const std::vector<double>* x = column("x");
-  const std::vector<double>* y = column("y");
+  const std::vector<double>*x = signals.find("x"), *y = signals.find("y");
   if (x == nullptr || y == nullptr) {
     return {};
   }

@@ -23,6 +23,29 @@ struct Range {
   void take(double x);
 };
 
+/// An axis of a drawing: the numbers that it has taken, from pixel `from` to pixel `to`.
+struct Axis : Range {
+  double from, to;
+  bool logarithmic;  ///< then low > 0
+
+  /// An axis that has taken nothing yet.
+  Axis(double first, double last, bool logarithms = false) : from(first), to(last), logarithmic(logarithms) {}
+  Axis(const Range& range, double first, double last, bool logarithms = false)
+      : Range(range), from(first), to(last), logarithmic(logarithms) {}
+
+  /// True if it has taken no number.
+  [[nodiscard]] bool empty() const { return !(low <= high); }
+  /// Widens it at both ends by `share` of its length, by a tenth of its number if it has taken one only; [0, 1] stands
+  /// for none.
+  void pad(double share);
+  /// The pixel of `x`.
+  [[nodiscard]] double operator()(double x) const;
+  /// The pixel of the number of the axis that is nearest to `x`.
+  [[nodiscard]] double inside(double x) const;
+  /// Round numbers on it, about five of them unless it is logarithmic.
+  [[nodiscard]] std::vector<double> ticks() const;
+};
+
 /// The powers of ten in [low, high] and, where `fine`, 2 and 5 times these; low > 0.
 [[nodiscard]] std::vector<double> logarithmic_ticks(double low, double high, bool fine);
 

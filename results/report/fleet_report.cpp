@@ -24,19 +24,6 @@ constexpr double kFleetWidth = 860.0, kHeight = 240.0, kFleetLeft = 74.0, kFleet
                  kFleetBottom = 30.0;
 constexpr std::size_t kColumns = 400;
 
-struct Axis : Range {
-  void pad(double share) {
-    const double more = high > low ? share * (high - low) : std::max(1e-9, 0.1 * std::abs(high));
-    low -= more;
-    high += more;
-  }
-  // Height of a value; what lies beyond is put at the edge.
-  [[nodiscard]] double y(double x) const {
-    const double share = (std::clamp(x, low, high) - low) / (high - low);
-    return kHeight - kFleetBottom - share * (kHeight - kFleetBottom - kFleetTop);
-  }
-};
-
 std::string frame(const Axis& axis, const std::string& label, const std::string& unit, const std::string& below) {
   std::string out =
       fmt::format("<svg viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" aria-label=\"{2}\">",
@@ -46,7 +33,7 @@ std::string frame(const Axis& axis, const std::string& label, const std::string&
     out += fmt::format(
         "<line class=\"axis\" x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/><text x=\"{}\" y=\"{:.1f}\" "
         "text-anchor=\"end\">{}</text>",
-        kFleetLeft, kFleetWidth - kFleetRight, axis.y(x), axis.y(x), kFleetLeft - 5.0, axis.y(x) + 4.0,
+        kFleetLeft, kFleetWidth - kFleetRight, axis.inside(x), axis.inside(x), kFleetLeft - 5.0, axis.inside(x) + 4.0,
         escape(number(x)));
   }
   return out + fmt::format(
@@ -58,7 +45,7 @@ std::string frame(const Axis& axis, const std::string& label, const std::string&
 
 // Robots of one column of the drawing.
 struct Bin {
-  Axis bounds, estimates;
+  Range bounds, estimates;
 };
 
 }  // namespace
@@ -82,7 +69,7 @@ std::string fleet_strip(const FleetResult& fleet, std::size_t parameter) {
       outside.insert(o.robot);
     }
   }
-  Axis axis;
+  Axis axis{kHeight - kFleetBottom, kFleetTop};
   std::vector<double> lower, upper;
   for (const study::FleetEntry* e : shown) {
     axis.take(e->estimate);
@@ -100,12 +87,12 @@ std::string fleet_strip(const FleetResult& fleet, std::size_t parameter) {
                           fmt::format("{}, sorted by estimate", plural(shown.size(), "robot")));
   if (population.described) {
     const double two = 2.0 * population.fit.spread;
-    const double y0 = axis.y(population.fit.centre + two), y1 = axis.y(population.fit.centre - two);
+    const double y0 = axis.inside(population.fit.centre + two), y1 = axis.inside(population.fit.centre - two);
     out += fmt::format(
         "<rect x=\"{}\" width=\"{}\" y=\"{:.1f}\" height=\"{:.1f}\" style=\"fill:var(--pale)\"/><line x1=\"{}\" "
         "x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\" style=\"stroke:var(--second);stroke-dasharray:6 4\"/>",
         kFleetLeft, kFleetWidth - kFleetLeft - kFleetRight, y0, std::max(y1 - y0, 0.5), kFleetLeft,
-        kFleetWidth - kFleetRight, axis.y(population.fit.centre), axis.y(population.fit.centre));
+        kFleetWidth - kFleetRight, axis.inside(population.fit.centre), axis.inside(population.fit.centre));
   }
   const std::size_t bins = std::min(shown.size(), kColumns);
   const double step = (kFleetWidth - kFleetLeft - kFleetRight) / static_cast<double>(bins);
@@ -122,13 +109,13 @@ std::string fleet_strip(const FleetResult& fleet, std::size_t parameter) {
       marks += fmt::format(
           "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" style=\"fill:none;stroke:var(--bad);stroke-width:2\">"
           "<title>{}</title></circle>",
-          x_of(at), axis.y(shown[i]->estimate), escape(fleet.table.robots[shown[i]->robot]));
+          x_of(at), axis.inside(shown[i]->estimate), escape(fleet.table.robots[shown[i]->robot]));
     }
   }
   for (std::size_t b = 0; b < bins; ++b) {
-    bars +=
-        fmt::format("M{:.1f} {:.1f}V{:.1f}", x_of(b), axis.y(content[b].bounds.low), axis.y(content[b].bounds.high));
-    const double y = axis.y(content[b].estimates.low), to = axis.y(content[b].estimates.high);
+    bars += fmt::format("M{:.1f} {:.1f}V{:.1f}", x_of(b), axis.inside(content[b].bounds.low),
+                        axis.inside(content[b].bounds.high));
+    const double y = axis.inside(content[b].estimates.low), to = axis.inside(content[b].estimates.high);
     dots += fmt::format("M{:.1f} {:.1f}V{:.1f}", x_of(b), y + 1.0, to - 1.0);
   }
   const double thick = std::clamp(0.7 * step, 0.8, 6.0);
@@ -149,7 +136,7 @@ std::string slope_strip(const FleetResult& fleet, std::size_t column, std::size_
   if (shown.empty()) {
     return {};
   }
-  Axis axis;
+  Axis axis{kHeight - kFleetBottom, kFleetTop};
   axis.take(0.0);
   for (const study::ParameterDrift* d : shown) {
     axis.take(d->slope - 2.0 * d->slope_error);
@@ -162,7 +149,7 @@ std::string slope_strip(const FleetResult& fleet, std::size_t column, std::size_
             fmt::format("{}, worst first", plural(shown.size(), "robot")));
   const double step = (kFleetWidth - kFleetLeft - kFleetRight) / static_cast<double>(shown.size());
   out += fmt::format("<line x1=\"{}\" x2=\"{}\" y1=\"{:.1f}\" y2=\"{:.1f}\" style=\"stroke:var(--ink)\"/>", kFleetLeft,
-                     kFleetWidth - kFleetRight, axis.y(0.0), axis.y(0.0));
+                     kFleetWidth - kFleetRight, axis.inside(0.0), axis.inside(0.0));
   for (std::size_t k = 0; k < shown.size(); ++k) {
     const study::ParameterDrift& d = *shown[k];
     const double x = kFleetLeft + (static_cast<double>(k) + 0.5) * step;
@@ -170,7 +157,7 @@ std::string slope_strip(const FleetResult& fleet, std::size_t column, std::size_
         "<path d=\"M{0:.1f} {1:.1f}V{2:.1f}\" style=\"stroke:var(--first);stroke-width:{3:.1f}\"/><circle "
         "cx=\"{0:.1f}\" "
         "cy=\"{4:.1f}\" r=\"3\" style=\"fill:var({5})\"><title>{6}</title></circle>",
-        x, axis.y(d.lower), axis.y(d.upper), std::clamp(0.4 * step, 1.0, 5.0), axis.y(d.slope),
+        x, axis.inside(d.lower), axis.inside(d.upper), std::clamp(0.4 * step, 1.0, 5.0), axis.inside(d.slope),
         d.drifts(fleet.drift_level) ? "--bad" : "--ink", escape(fleet.table.robots[d.robot]));
   }
   return out + "</svg>";

@@ -27,16 +27,6 @@ std::string rectangle(double x, double y, double width, double height, const std
                      style);
 }
 
-// A logarithmic axis.
-struct LogAxis {
-  double low, high, from, to;
-  [[nodiscard]] double operator()(double x) const {
-    return from + (to - from) * std::log(std::clamp(x, low, high) / low) / std::log(high / low);
-  }
-  // The decades inside it, with 2 and 5 between where these are few.
-  [[nodiscard]] std::vector<double> ticks() const { return logarithmic_ticks(low, high, high / low < 300.0); }
-};
-
 struct Look {
   const char* colour;
   const char* dash;
@@ -173,7 +163,7 @@ std::string spectrum_drawing(const gap::ResidualSeries& series, double beta) {
   }
   low = std::max(low, high * 1e-9);
   constexpr double width = 525.0, height = 270.0, left = 78.0, right = 130.0, top = 10.0, bottom = 42.0;
-  const LogAxis x{first, last, left, width - right}, y{low / 1.5, high * 1.5, height - bottom, top};
+  const Axis x{{first, last}, left, width - right, true}, y{{low / 1.5, high * 1.5}, height - bottom, top, true};
   std::string out = open_svg(width, height, "spectrum before, re-fitted, after, and of the floor");
   for (const double tick : x.ticks()) {
     out += line(x(tick), top, x(tick), height - bottom, "class=\"axis\"") +
@@ -197,7 +187,8 @@ std::string spectrum_drawing(const gap::ResidualSeries& series, double beta) {
         ++end;
       }
       fmt::format_to(std::back_inserter(d), "{}{:.1f} {:.1f}", d.empty() ? "M" : "L",
-                     x(s.frequency.segment(b, end - b).mean()), y(std::max(s.density.segment(b, end - b).mean(), low)));
+                     x.inside(s.frequency.segment(b, end - b).mean()),
+                     y.inside(std::max(s.density.segment(b, end - b).mean(), low)));
       b = end;
     }
     out += fmt::format("<path d=\"{}\" {}/>", d, stroke(kLooks[k]));
@@ -214,12 +205,7 @@ std::string spectrum_drawing(const gap::ResidualSeries& series, double beta) {
 }
 
 std::string position_map(const gap::ResidualSeries& series, const LogTable& signals, double delay) {
-  const auto column = [&](std::string_view name) -> const std::vector<double>* {
-    const auto found = std::find(signals.names.begin(), signals.names.end(), name);
-    return found == signals.names.end() ? nullptr
-                                        : &signals.columns[static_cast<std::size_t>(found - signals.names.begin())];
-  };
-  const std::vector<double>*xs = column("x"), *ys = column("y");
+  const std::vector<double>*xs = signals.find("x"), *ys = signals.find("y");
   if (xs == nullptr || ys == nullptr || signals.t.empty() || series.refitted.size() != series.t.size()) {
     return {};
   }

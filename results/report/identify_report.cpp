@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -11,6 +10,7 @@
 
 #include "core/statistics.hpp"
 #include "identify/noise_level.hpp"
+#include "results/report/drawing.hpp"
 #include "results/report/page.hpp"
 #include "results/report/signals.hpp"
 #include "results/words/identification_words.hpp"
@@ -34,19 +34,13 @@ double round_step(double span, double parts) {
   return 10.0 * power;
 }
 
-struct Span {
-  double low = 0.0, high = 1.0;   // of numbers
-  double from = 0.0, to = 100.0;  // of pixels
-  [[nodiscard]] double operator()(double x) const { return from + (to - from) * (x - low) / (high - low); }
-};
-
 std::string tick_text(double x, double step) {
   const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
   return decimal(std::abs(x) < 1e-9 * step ? 0.0 : x, std::min(decimals, 9));
 }
 
 // Vertical rules with numbers below.
-std::string ticks_below(const Span& x, double top, double bottom, double unit, double parts) {
+std::string ticks_below(const Axis& x, double top, double bottom, double unit, double parts) {
   std::string out;
   const double step = round_step(x.high * unit - x.low * unit, parts);
   for (double at = std::ceil(x.low * unit / step - 1e-9) * step; at <= x.high * unit + 1e-9 * step; at += step) {
@@ -76,7 +70,7 @@ std::string information_bars(const inference::InformationOverTime& information, 
     }
     return axis.shown(end ? information.windows[k].last : information.windows[k].first);
   };
-  Span x{edge(0, false), edge(windows - 1, true), left, width - 14.0};
+  const Axis x{{edge(0, false), edge(windows - 1, true)}, left, width - 14.0};
   if (!(x.high > x.low)) {
     return {};
   }
@@ -106,13 +100,12 @@ std::string information_bars(const inference::InformationOverTime& information, 
 }
 
 std::string shape_curve(const inference::ShapeFinding& shape) {
-  Span y{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(), 150.0, 12.0};
+  Axis y{150.0, 12.0};
   std::vector<inference::ShapePoint> points;
   for (const inference::ShapePoint& point : shape.curve) {
     if (std::isfinite(point.residual_ratio) && std::isfinite(point.shape)) {
       points.push_back(point);
-      y.low = std::min(y.low, point.residual_ratio);
-      y.high = std::max(y.high, point.residual_ratio);
+      y.take(point.residual_ratio);
     }
   }
   if (points.size() < 2 || !(points.back().shape > points.front().shape)) {
@@ -122,7 +115,7 @@ std::string shape_curve(const inference::ShapeFinding& shape) {
   y.low = std::max(y.low - margin, 0.0);
   y.high += margin;
   constexpr double width = 420.0, left = 56.0, bottom = 150.0;
-  const Span x{points.front().shape, points.back().shape, left, width - 14.0};
+  const Axis x{{points.front().shape, points.back().shape}, left, width - 14.0};
   const double unit = shape.unit == "s" ? 1e3 : 1.0;
   std::string out = fmt::format(
       "<svg viewBox=\"0 0 {0} 186\" width=\"{0}\" height=\"186\" role=\"img\" aria-label=\"residual over {1}\">", width,

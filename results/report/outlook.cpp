@@ -39,10 +39,7 @@ std::string outlook_picture(const DetectionCurve& curve, bool with_risk) {
   constexpr double width = 330.0, height = 210.0, left = 46.0, right = 12.0, top = 10.0, bottom = 36.0;
   const double scale = curve.fault.unit == "1" ? 100.0 : 1.0;
   const double low = scale * sizes.low / 1.25, high = scale * sizes.high * 1.25;
-  const auto x = [&](double t) { return left + (width - right - left) * std::log(t / kFrom) / std::log(kTo / kFrom); };
-  const auto y = [&](double size) {
-    return height - bottom - (height - bottom - top) * std::log(size / low) / std::log(high / low);
-  };
+  const Axis x{{kFrom, kTo}, left, width - right, true}, y{{low, high}, height - bottom, top, true};
   std::string out = open_svg(width, height, "smallest certain size over the time to detection");
   for (const double tick : logarithmic_ticks(kFrom, kTo, true)) {
     out += fmt::format("<line class=\"axis\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/>", x(tick), top,

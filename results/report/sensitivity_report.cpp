@@ -43,42 +43,7 @@ std::string label_words(const AxisLabel& label) {
   return label.unit.empty() ? label.name : label.name + ", " + label.unit;
 }
 
-// An axis from pixel `from` to pixel `to` over the numbers that it has taken.
-struct Scale : Range {
-  double from, to;
-  bool logarithmic;
-
-  Scale(double first, double last, bool logarithms = false) : from(first), to(last), logarithmic(logarithms) {}
-  [[nodiscard]] bool empty() const { return !(low <= high); }
-  void pad() {
-    const double margin = high > low ? 0.05 * (high - low) : (high != 0.0 ? 0.1 * std::abs(high) : 1.0);
-    low -= margin;
-    high += margin;
-  }
-  [[nodiscard]] double operator()(double x) const {
-    const double share = logarithmic ? std::log(x / low) / std::log(high / low) : (x - low) / (high - low);
-    return from + (to - from) * share;
-  }
-  // Round numbers, about five of them.
-  [[nodiscard]] std::vector<double> ticks() const {
-    if (logarithmic) {
-      return logarithmic_ticks(low, high, high / low < 300.0);
-    }
-    std::vector<double> out;
-    const double rough = (high - low) / 5.0, power = std::pow(10.0, std::floor(std::log10(rough)));
-    const double step = power * (rough < 1.5 * power   ? 1.0
-                                 : rough < 3.5 * power ? 2.0
-                                 : rough < 7.5 * power ? 5.0
-                                                       : 10.0);
-    const double first = std::ceil(low / step);
-    for (int k = 0; k < 12 && (first + k) * step <= high; ++k) {
-      out.push_back((first + k) * step);
-    }
-    return out;
-  }
-};
-
-std::string across(const Scale& x, double top, double bottom) {
+std::string across(const Axis& x, double top, double bottom) {
   std::string out;
   for (const double tick : x.ticks()) {
     out += stroke(x(tick), top, x(tick), bottom, "class=\"axis\"") +
@@ -87,7 +52,7 @@ std::string across(const Scale& x, double top, double bottom) {
   return out;
 }
 
-std::string up(const Scale& y, double left, double right) {
+std::string up(const Axis& y, double left, double right) {
   std::string out;
   for (const double tick : y.ticks()) {
     out += stroke(left, y(tick), right, y(tick), "class=\"axis\"") +
@@ -117,7 +82,7 @@ std::string tornado(const study::OneAtATime& study, const std::vector<std::strin
   names_fit(inputs, study.inputs.size());
   constexpr double row = 22.0, top = 6.0, span = 340.0;
   const double left = room(inputs);
-  Scale x{left, left + span};
+  Axis x{left, left + span};
   const std::size_t n = std::min(most, study.order.size());
   for (std::size_t k = 0; k < n; ++k) {
     for (const double y : study.inputs[study.order[k]].values) {
@@ -128,7 +93,7 @@ std::string tornado(const study::OneAtATime& study, const std::vector<std::strin
     return {};
   }
   x.take(study.nominal);
-  x.pad();
+  x.pad(0.05);
   const double bottom = top + row * static_cast<double>(n);
   std::string out = open_svg(left + span + 20.0, bottom + 58.0, quantity.name + " at both ends of each input");
   out += across(x, top, bottom);
@@ -169,7 +134,7 @@ std::string sensitivity_curve(const Eigen::VectorXd& x, const Eigen::VectorXd& y
               fmt::format("{}, one for each place", x.size()));
   check::that(!logarithmic || (x.array() > 0.0).all(), "places on a logarithmic axis", "numbers > 0");
   constexpr double width = 320.0, height = 210.0, left = 70.0, top = 10.0, bottom = height - 42.0, right = width - 14.0;
-  Scale across_axis{left, right, logarithmic}, up_axis{bottom, top};
+  Axis across_axis{left, right, logarithmic}, up_axis{bottom, top};
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     across_axis.take(x[k]);
     up_axis.take(y[k]);
@@ -178,7 +143,7 @@ std::string sensitivity_curve(const Eigen::VectorXd& x, const Eigen::VectorXd& y
     return {};
   }
   up_axis.take(nominal_y);
-  up_axis.pad();
+  up_axis.pad(0.05);
   std::string out = open_svg(width, height, quantity.name + " over " + input.name);
   out += across(across_axis, top, bottom) + up(up_axis, left, right);
   std::string path, dots;
@@ -215,7 +180,7 @@ std::string sobol_bars(const study::SobolIndices& indices, const std::vector<std
                    [&](std::size_t a, std::size_t b) { return indices.total[a].estimate > indices.total[b].estimate; });
   constexpr double row = 34.0, top = 6.0, span = 300.0;
   const double left = room(inputs), bottom = top + row * static_cast<double>(n);
-  Scale x{left, left + span};
+  Axis x{left, left + span};
   x.take(0.0);
   x.take(1.0);
   for (std::size_t k = 0; k < n; ++k) {
@@ -248,7 +213,7 @@ std::string morris_scatter(const std::vector<study::ElementaryEffects>& effects,
   names_fit(inputs, effects.size());
   constexpr double left = 70.0, top = 10.0, side = 280.0, right = left + side;
   const double bottom = std::max(top + 220.0, top + 16.0 * static_cast<double>(effects.size()));
-  Scale x{left, right}, y{bottom, top};
+  Axis x{left, right}, y{bottom, top};
   x.take(0.0);
   y.take(0.0);
   std::vector<std::size_t> order;
@@ -291,7 +256,7 @@ std::string sensitivity_map(const study::GridMap& map, const Eigen::VectorXd& x,
                             const AxisLabel& x_label, const AxisLabel& y_label, const AxisLabel& quantity) {
   check::that(x.size() == map.values.rows() && y.size() == map.values.cols(), "values of a map's inputs",
               fmt::format("{} and {}, as the map", map.values.rows(), map.values.cols()));
-  Scale shade{0.08, 0.92};
+  Axis shade{0.08, 0.92};
   for (const double value : map.values.reshaped()) {
     shade.take(value);
   }
@@ -522,7 +487,7 @@ Section inputs_section(const Study& study) {
                     input.logarithmic ? "logarithmic" : "linear"});
   }
   return {"inputs", "Inputs",
-          table({"Input", numeric("from"), numeric("nominal"), numeric("to"), "Unit", "Scale"}, rows)};
+          table({"Input", numeric("from"), numeric("nominal"), numeric("to"), "Unit", "Axis"}, rows)};
 }
 
 }  // namespace
