@@ -12,7 +12,6 @@
 
 namespace wheelwright::app {
 
-using doctor::first_rows;
 using results::kExaminedRows;
 using results::SoundLog;
 using results::WheelPose;

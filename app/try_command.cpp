@@ -134,7 +134,7 @@ void geometry_from_log(const Arguments& a, RobotWithOrigins& made) {
     log = logs::open_log(a.logs, reader);
     from = topic;
   }
-  LogTable table = first_rows(*log, kExaminedRows);
+  LogTable table = read_all(*log, kExaminedRows);
   add_speeds(table);
   const auto has = [&](const char* name) { return table.find(name) != nullptr; };
   const std::string wanted =
@@ -207,7 +207,7 @@ void settle_from_log(const Arguments& a, RobotWithOrigins& made) {
     }
   }
   made.origins["effort.kind"] = "by the columns of the log";
-  const LogTable table = first_rows(*log, kExaminedRows);
+  const LogTable table = read_all(*log, kExaminedRows);
   const doctor::LogHealth health = doctor::examine(table, robot);
   const doctor::LogFinding* delay = health.find("time.effort_delay");
   if (delay != nullptr && health.median_step > 0.0) {

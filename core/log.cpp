@@ -143,19 +143,25 @@ std::unique_ptr<LogSource> TableSource::another_walk() const {
   return walk;
 }
 
-LogTable read_all(LogSource& source) {
+LogTable read_all(LogSource& source, std::size_t most) {
   source.rewind();
   LogTable table;
   table.names = source.columns();
   table.columns.resize(table.names.size());
   LogBlock block;
-  while (source.next(block)) {
+  while (table.rows() < most && source.next(block)) {
+    const std::size_t rows = std::min(block.rows(), most - table.rows());
     for (const std::size_t start : block.segment_starts) {
-      table.segment_starts.push_back(table.t.size() + start);
+      if (start < rows) {
+        table.segment_starts.push_back(table.rows() + start);
+      }
     }
-    table.t.insert(table.t.end(), block.t.begin(), block.t.end());
+    const auto append = [rows](std::vector<double>& to, const std::vector<double>& from) {
+      to.insert(to.end(), from.begin(), from.begin() + static_cast<std::ptrdiff_t>(rows));
+    };
+    append(table.t, block.t);
     for (std::size_t c = 0; c < table.columns.size(); ++c) {
-      table.columns[c].insert(table.columns[c].end(), block.columns[c].begin(), block.columns[c].end());
+      append(table.columns[c], block.columns[c]);
     }
   }
   source.rewind();

@@ -140,8 +140,8 @@ class TableSource final : public LogSource {
   double median_step_ = 0.0;
 };
 
-/// Reads all of `source` (from its beginning) into a table.
-[[nodiscard]] LogTable read_all(LogSource& source);
+/// Reads all of `source` (from its beginning) into a table, or its first `most` rows. The log is rewound.
+[[nodiscard]] LogTable read_all(LogSource& source, std::size_t most = static_cast<std::size_t>(-1));
 
 /// A bound on an error of one column of a log, in its unit.
 struct ColumnError {

@@ -18,7 +18,7 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
   SoundLog out;
   out.log = logs::open_log(paths, reader);
   const doctor::LogHealth health =
-      doctor::examine(doctor::first_rows(*out.log, kExaminedRows), robot, reader_counts(out.log->report()), threads);
+      doctor::examine(read_all(*out.log, kExaminedRows), robot, reader_counts(out.log->report()), threads);
   std::string wrong;
   std::vector<std::string> names;
   for (const doctor::LogFinding& finding : health.findings) {

@@ -40,7 +40,7 @@ doctor::ReaderCounts reader_counts(const logs::LogReport& report) {
 
 doctor::LogHealth examine_first(logs::RecordedLog& log, const std::optional<Robot>& robot, std::size_t most,
                                 std::size_t threads) {
-  const LogTable table = doctor::first_rows(log, most);
+  const LogTable table = read_all(log, most);
   doctor::LogHealth health = doctor::examine(table, robot, reader_counts(log.report()), threads);
   if (table.rows() < log.report().rows) {
     health.findings.push_back(

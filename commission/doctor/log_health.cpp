@@ -381,29 +381,6 @@ const LogFinding* LogHealth::find(std::string_view id) const {
   return at == findings.end() ? nullptr : &*at;
 }
 
-LogTable first_rows(LogSource& log, std::size_t most) {
-  LogTable table;
-  table.names = log.columns();
-  table.columns.resize(table.names.size());
-  LogBlock block;
-  log.rewind();
-  while (table.rows() < most && log.next(block)) {
-    const std::size_t take = std::min(block.rows(), most - table.rows());
-    for (const std::size_t start : block.segment_starts) {
-      if (start < take) {
-        table.segment_starts.push_back(table.rows() + start);
-      }
-    }
-    for (std::size_t c = 0; c < table.columns.size(); ++c) {
-      table.columns[c].insert(table.columns[c].end(), block.columns[c].begin(),
-                              block.columns[c].begin() + static_cast<std::ptrdiff_t>(take));
-    }
-    table.t.insert(table.t.end(), block.t.begin(), block.t.begin() + static_cast<std::ptrdiff_t>(take));
-  }
-  log.rewind();
-  return table;
-}
-
 LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const ReaderCounts& reader,
                   std::size_t threads) {
   const HealthView view = make_view(log, robot);

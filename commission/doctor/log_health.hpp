@@ -88,9 +88,6 @@ struct LogHealth {
   [[nodiscard]] const LogFinding* find(std::string_view id) const;
 };
 
-/// At most `most` rows of `log`, in memory; the log is rewound.
-[[nodiscard]] LogTable first_rows(LogSource& log, std::size_t most);
-
 /// Looks at `log`, which must hold what a LogSource promises (finite, increasing inside a segment). `robot` (nothing:
 /// a differential drive or a single axis, by the columns) tells columns, geometry, limits and the model whose
 /// excitation is judged; without it, scales of units cannot be judged against radius, track and mass.
