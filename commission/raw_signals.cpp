@@ -25,20 +25,12 @@ struct ColumnRange {
 };
 
 std::vector<ColumnRange> ranges_of(LogSource& log, const std::vector<std::string>& columns) {
-  std::vector<std::size_t> pick;
-  for (const std::string& column : columns) {
-    pick.push_back(*log.find(column));
-  }
   std::vector<ColumnRange> ranges(columns.size());
-  LogBlock block;
-  log.rewind();
-  while (log.next(block)) {
-    for (std::size_t c = 0; c < pick.size() && block.rows() > 0; ++c) {
-      const auto [least, most] = std::ranges::minmax(block.columns[pick[c]]);
-      ranges[c] = {std::min(ranges[c].least, least), std::max(ranges[c].most, most)};
+  core::for_each_sample(log, columns, [&](const core::LogSample& sample) {
+    for (std::size_t c = 0; c < ranges.size(); ++c) {
+      ranges[c] = {std::min(ranges[c].least, sample.values[c]), std::max(ranges[c].most, sample.values[c])};
     }
-  }
-  log.rewind();
+  });
   return ranges;
 }
 
@@ -70,23 +62,18 @@ void find_wrapped_angles(LogSource& log, const Setting& s, const std::vector<Col
     if (ranges[j].most - ranges[j].least > 2.0 * kHalfTurn * (1.0 + 1e-6)) {
       continue;
     }
-    const std::size_t column = *log.find(name);
     double last = std::numeric_limits<double>::quiet_NaN(), least_jump = core::kInfinity, most_move = 0.0;
     std::size_t jumps = 0;
-    LogBlock block;
-    log.rewind();
-    while (log.next(block)) {
-      for (const double value : block.columns[column]) {
-        const double moved = std::abs(value - last);
-        if (moved > kHalfTurn) {
-          ++jumps;
-          least_jump = std::min(least_jump, moved);
-        } else if (moved <= kHalfTurn) {
-          most_move = std::max(most_move, moved);
-        }
-        last = value;
+    core::for_each_sample(log, {name}, [&](const core::LogSample& sample) {
+      const double moved = std::abs(sample.values[0] - last);
+      if (moved > kHalfTurn) {
+        ++jumps;
+        least_jump = std::min(least_jump, moved);
+      } else if (moved <= kHalfTurn) {
+        most_move = std::max(most_move, moved);
       }
-    }
+      last = sample.values[0];
+    });
     if (jumps > 0 && most_move < kMoves * kHalfTurn) {
       out.push_back({.kind = Kind::angle_wrapped,
                      .subject = name,
@@ -98,7 +85,6 @@ void find_wrapped_angles(LogSource& log, const Setting& s, const std::vector<Col
                      .next = "unwrap the angle (numpy.unwrap) before commissioning; files are unwrapped on reading"});
     }
   }
-  log.rewind();
 }
 
 // A sample against the line through its neighbours, drawn over the stamps and over row numbers. Of angles: the speed of
@@ -109,45 +95,34 @@ void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogCont
   if (s.measurement.motion != MotionKind::angle) {
     return;
   }
-  std::vector<std::size_t> pick;
-  for (const std::string& column : s.measurement.motion_columns) {
-    pick.push_back(*log.find(column));
-  }
+  const std::size_t joints = s.measurement.motion_columns.size();
   const double longest = s.measurement.longest_step();
-  std::vector<double> before(pick.size()), middle(pick.size());
+  std::vector<double> before(joints), middle(joints);
   double t_before = 0.0, t_middle = 0.0, by_stamp = 0.0, by_row = 0.0;
   std::size_t known = 0, looked = 0;
-  LogBlock block;
-  log.rewind();
-  while (log.next(block)) {
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      const double t = block.t[k];
-      const bool starts =
-          std::ranges::binary_search(block.segment_starts, k) || (known > 0 && longest > 0.0 && t - t_middle > longest);
-      known = starts ? 0 : known;
-      if (known >= 2) {
-        const double a = t_middle - t_before, b = t - t_middle;
-        if (std::abs(a - b) > kEven * (a + b)) {
-          ++looked;
-          for (std::size_t c = 0; c < pick.size(); ++c) {
-            const double value = block.columns[pick[c]][k];
-            const double stamp = middle[c] - (before[c] * b + value * a) / (a + b);
-            const double row = middle[c] - 0.5 * (before[c] + value);
-            by_stamp += stamp * stamp;
-            by_row += row * row;
-          }
+  core::for_each_sample(log, s.measurement.motion_columns, [&](const core::LogSample& sample) {
+    const double t = sample.t;
+    const bool starts = sample.starts || (known > 0 && longest > 0.0 && t - t_middle > longest);
+    known = starts ? 0 : known;
+    if (known >= 2) {
+      const double a = t_middle - t_before, b = t - t_middle;
+      if (std::abs(a - b) > kEven * (a + b)) {
+        ++looked;
+        for (std::size_t c = 0; c < joints; ++c) {
+          const double value = sample.values[c];
+          const double stamp = middle[c] - (before[c] * b + value * a) / (a + b);
+          const double row = middle[c] - 0.5 * (before[c] + value);
+          by_stamp += stamp * stamp;
+          by_row += row * row;
         }
       }
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        before[c] = middle[c];
-        middle[c] = block.columns[pick[c]][k];
-      }
-      t_before = t_middle;
-      t_middle = t;
-      ++known;
     }
-  }
-  log.rewind();
+    before = middle;
+    middle.assign(sample.values.begin(), sample.values.end());
+    t_before = t_middle;
+    t_middle = t;
+    ++known;
+  });
   const double ratio = by_stamp > 0.0 ? std::sqrt(by_row / by_stamp) : 1.0;
   if (looked >= kFewestInstants && ratio < kSmoother) {
     out.push_back(
