@@ -138,7 +138,7 @@ std::string origin(const Arguments& a, const Diagnosis& d) {
   }
   std::string line = fmt::format("# {} with what `wheelwright gap` found in {}: {} ({}). {}.", a.robot.string(),
                                  fmt::join(names_of_files(a.logs), ", "), fmt::join(effects, ", "),
-                                 results::name_of(d.verdict), results::software());
+                                 gap::to_string(d.verdict), results::software());
   for (char& c : line) {
     c = static_cast<unsigned char>(c) < 0x20U ? ' ' : c;
   }

@@ -213,8 +213,8 @@ void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Ef
   const auto play = std::ranges::find(catalogue, true, &Effect::above_band);
   // What acts at the same instants is known no sharper than its column has it.
   const bool known = std::ranges::any_of(result.causes, [&](const GapCause& cause) {
-    const auto effect = std::ranges::find(catalogue, cause.effect, &Effect::name);
-    return effect != catalogue.end() && effect->after_reversals;
+    const Effect* const effect = find_effect(catalogue, cause.effect);
+    return effect != nullptr && effect->after_reversals;
   });
   const auto has_play = [&](const CredibleCauses& set) {
     return std::ranges::find(set.effects, play->name) != set.effects.end();
@@ -476,6 +476,16 @@ Eigen::VectorXd roots_of_parts(const Eigen::VectorXd& left) {
 }
 
 }  // namespace
+
+std::string_view to_string(GapVerdict verdict) {
+  switch (verdict) {
+    case GapVerdict::no_gap: return "no_gap";
+    case GapVerdict::explained: return "explained";
+    case GapVerdict::ambiguous: return "ambiguous";
+    case GapVerdict::unexplained: return "unexplained";
+  }
+  return "";
+}
 
 std::vector<ShrinkFigure> torque_on(LogSource& fresh, LogSource* baseline, const Robot& robot, const Diagnosis& found,
                                     const DiagnoseOptions& options) {

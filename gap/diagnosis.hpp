@@ -28,6 +28,9 @@ enum class GapVerdict {
   unexplained,  ///< what the best cause leaves is above the floor
 };
 
+/// Its name in files: that of the enumerator.
+[[nodiscard]] std::string_view to_string(GapVerdict verdict);
+
 /// What the robot of the log is compared with.
 enum class GapReference {
   robot_file,   ///< the model with the nominal values of the robot file; those that it lacks are fitted to the log

@@ -484,7 +484,7 @@ void bind_gap(py::module_& m) {
       m, "Diagnosis", "The sim-to-real gap of a robot: gap.json and the numbers behind it.");
   diagnosis
       .def_property_readonly(
-          "verdict", [](const DiagnosisObject& d) { return std::string(results::name_of(d.diagnosis.verdict)); },
+          "verdict", [](const DiagnosisObject& d) { return std::string(gap::to_string(d.diagnosis.verdict)); },
           "no_gap, explained, ambiguous or unexplained")
       .def_property_readonly("summary", [](const DiagnosisObject& d) { return d.diagnosis.summary; })
       .def_property_readonly(

@@ -103,16 +103,6 @@ void append(std::string& line, const Eigen::VectorXd& values, Eigen::Index k) {
 
 }  // namespace
 
-const char* name_of(gap::GapVerdict verdict) {
-  switch (verdict) {
-    case gap::GapVerdict::no_gap: return "no_gap";
-    case gap::GapVerdict::explained: return "explained";
-    case gap::GapVerdict::ambiguous: return "ambiguous";
-    case gap::GapVerdict::unexplained: return "unexplained";
-  }
-  return "";
-}
-
 Json to_json(const Diagnosis& d, const GapFiles& files) {
   Json credible = Json::array(), confusable = Json::array(), contradictions = Json::array();
   for (const gap::CredibleCauses& c : d.credible) {
@@ -135,7 +125,7 @@ Json to_json(const Diagnosis& d, const GapFiles& files) {
     next = {{"file", files.next_manoeuvre->file}, {"sentence", files.next_manoeuvre->sentence}};
   }
   return {{"schema", kGapSchema},
-          {"verdict", name_of(d.verdict)},
+          {"verdict", gap::to_string(d.verdict)},
           {"summary", d.summary},
           {"causes", causes_json(d.causes)},
           {"credible_set", std::move(credible)},
@@ -190,11 +180,6 @@ void write_residuals(const std::filesystem::path& path, const std::vector<gap::R
 }
 
 namespace {
-
-const Effect* find(const std::vector<Effect>& catalogue, const std::string& name) {
-  const auto found = std::ranges::find(catalogue, name, &Effect::name);
-  return found == catalogue.end() ? nullptr : &*found;
-}
 
 std::optional<double> estimate(const files::JsonPlace& parameters, const std::string& name) {
   return parameters.has(name) ? std::optional(parameters.at(name).at("estimate").number()) : std::nullopt;
@@ -281,7 +266,7 @@ std::vector<gap::Rival> rivals_of_gap(const Json& json, const std::string& file,
     const std::vector<std::string> effects = credible.at(i).at("effects").texts();
     prefer_its_laws(catalogue, effects, credible.at(i));
     const bool known = std::ranges::all_of(effects, [&](const std::string& name) {
-      const Effect* effect = find(catalogue, name);
+      const Effect* effect = gap::find_effect(catalogue, name);
       return effect != nullptr && gap::applicability(*effect, drive).applies;
     });
     if (effects.empty() || !known) {
@@ -290,12 +275,12 @@ std::vector<gap::Rival> rivals_of_gap(const Json& json, const std::string& file,
     gap::Rival rival = gap::typical_rival(effects, catalogue, drive);
     if (credible.at(i).has("parameters")) {
       for (gap::RivalCause& cause : rival.causes) {
-        take(cause, *find(catalogue, cause.effect), credible.at(i).at("parameters"), cause.effect + ".");
+        take(cause, *gap::find_effect(catalogue, cause.effect), credible.at(i).at("parameters"), cause.effect + ".");
       }
     } else if (std::set<std::string>(effects.begin(), effects.end()) == best) {
       for (std::size_t k = 0; k < causes.size(); ++k) {
         const std::string name = causes.at(k).at("effect").text();
-        take(*std::ranges::find(rival.causes, name, &gap::RivalCause::effect), *find(catalogue, name),
+        take(*std::ranges::find(rival.causes, name, &gap::RivalCause::effect), *gap::find_effect(catalogue, name),
              causes.at(k).at("parameters"), "");
       }
     }

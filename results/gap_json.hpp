@@ -35,9 +35,6 @@ struct GapFiles {
   std::string software;  ///< name and version
 };
 
-/// Name of a verdict in files: "no_gap", "explained", "ambiguous", "unexplained".
-[[nodiscard]] const char* name_of(gap::GapVerdict verdict);
-
 /// The diagnosis as JSON (results/gap.schema.json). Of `where`, the channels, the frequency bands and the regimes that
 /// are findings (is_finding) are written; its series are not: see write_residuals().
 [[nodiscard]] Json to_json(const Diagnosis& diagnosis, const GapFiles& files);

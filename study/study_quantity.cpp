@@ -241,16 +241,6 @@ double fault_value(const commission::MarginSurvey& survey, const StudyQuantity& 
   });
 }
 
-const char* verdict_name(gap::GapVerdict verdict) {
-  switch (verdict) {
-    case gap::GapVerdict::no_gap: return "no_gap";
-    case gap::GapVerdict::explained: return "explained";
-    case gap::GapVerdict::ambiguous: return "ambiguous";
-    case gap::GapVerdict::unexplained: return "unexplained";
-  }
-  return "";
-}
-
 void read_off(LogSource& log, const StudyCase& subject, const std::vector<StudyQuantity>& quantities,
               const EvaluateOptions& options, CaseResult& result) {
   commission::CommissionOptions commissioning;
@@ -281,7 +271,7 @@ void read_off(LogSource& log, const StudyCase& subject, const std::vector<StudyQ
     if (q.kind == Kind::commissioned) {
       value = model ? 1.0 : 0.0;
     } else if (q.kind == Kind::gap) {
-      value = verdict_name(*verdict) == q.subject ? 1.0 : 0.0;
+      value = gap::to_string(*verdict) == q.subject ? 1.0 : 0.0;
     } else if (model) {
       switch (q.kind) {
         case Kind::lower: value = c.parameters[q.index].lower; break;

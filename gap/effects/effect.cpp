@@ -303,14 +303,19 @@ std::vector<Effect> effect_catalogue() {
 
 std::vector<Effect> effect_catalogue(const Model& model) { return catalogue_of(model); }
 
+const Effect* find_effect(const std::vector<Effect>& catalogue, std::string_view name) {
+  const auto found = std::ranges::find(catalogue, name, &Effect::name);
+  return found == catalogue.end() ? nullptr : &*found;
+}
+
 std::string catalogue_noun(std::string_view name) {
   const auto law = std::ranges::find(model::effect_laws(), name, &model::EffectLaw::name);
   if (law != model::effect_laws().end()) {
     return law->noun;
   }
   static const std::vector<Effect> catalogue = effect_catalogue();
-  const auto effect = std::ranges::find(catalogue, name, &Effect::name);
-  return effect != catalogue.end() ? effect->noun : std::string();
+  const Effect* effect = find_effect(catalogue, name);
+  return effect != nullptr ? effect->noun : std::string();
 }
 
 namespace {

@@ -227,6 +227,9 @@ namespace wheelwright::gap {
 /// The same for the robot `model`: those with one joint have fewer effects, and one coefficient where wheels have two.
 [[nodiscard]] std::vector<Effect> effect_catalogue(const Model& model);
 
+/// The effect of that name, or null.
+[[nodiscard]] const Effect* find_effect(const std::vector<Effect>& catalogue, std::string_view name);
+
 /// Noun of the effect `name` in sentences: that of its law or of its entry in the catalogue; empty where there is
 /// neither.
 [[nodiscard]] std::string catalogue_noun(std::string_view name);

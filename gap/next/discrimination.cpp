@@ -21,8 +21,8 @@ namespace {
 constexpr int kGoldenSteps = 14;
 
 const Effect& find(const std::vector<Effect>& catalogue, const std::string& name) {
-  const auto found = std::ranges::find(catalogue, name, &Effect::name);
-  check::that(found != catalogue.end(), "rival '" + name + "'", "an effect of the catalogue");
+  const Effect* const found = find_effect(catalogue, name);
+  check::that(found != nullptr, "rival '" + name + "'", "an effect of the catalogue");
   return *found;
 }
 

@@ -230,10 +230,10 @@ std::string splitting_measurement(const Rival& a, const Rival& b, const std::vec
   bool parametric = false;
   for (const Rival* rival : {&a, &b}) {
     for (const RivalCause& cause : rival->causes) {
-      const auto effect = std::ranges::find(catalogue, cause.effect, &Effect::name);
+      const Effect* const effect = find_effect(catalogue, cause.effect);
       const bool in_both = std::ranges::count(a.causes, cause.effect, &RivalCause::effect) > 0 &&
                            std::ranges::count(b.causes, cause.effect, &RivalCause::effect) > 0;
-      if (!in_both && effect != catalogue.end()) {
+      if (!in_both && effect != nullptr) {
         by = std::min(by, effect->measured_by);
         parametric = parametric || effect->parametric;
       }

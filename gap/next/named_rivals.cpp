@@ -12,11 +12,6 @@
 namespace wheelwright::gap {
 namespace {
 
-const Effect* effect_called(const std::vector<Effect>& catalogue, const std::string& name) {
-  const auto found = std::ranges::find(catalogue, name, &Effect::name);
-  return found == catalogue.end() ? nullptr : &*found;
-}
-
 void resize(Rival& rival, const std::vector<Effect>& catalogue, const NamedSize& size) {
   const std::string effect = size.what.substr(0, size.what.find('.'));
   const auto value = [&](const std::string& unit) { return size.value(unit.empty() ? "1" : unit); };
@@ -24,7 +19,7 @@ void resize(Rival& rival, const std::vector<Effect>& catalogue, const NamedSize&
     if (cause.effect != effect) {
       continue;
     }
-    const Effect& known = *effect_called(catalogue, effect);
+    const Effect& known = *find_effect(catalogue, effect);
     if (size.what == effect && !cause.coefficients.empty()) {
       const double scale = value(known.parameters[0].unit) / cause.coefficients[0];
       std::ranges::for_each(cause.coefficients, [scale](double& c) { c *= scale; });
@@ -64,7 +59,7 @@ std::vector<Rival> rivals_named(const std::vector<std::string>& names, const std
     for (std::size_t from = 0; from <= name.size();) {
       const std::size_t plus = std::min(name.find('+', from), name.size());
       effects.push_back(name.substr(from, plus - from));
-      if (effect_called(catalogue, effects.back()) == nullptr) {
+      if (find_effect(catalogue, effects.back()) == nullptr) {
         throw InputError(label + name + ": '" + effects.back() + "' is no effect of the catalogue");
       }
       all.insert(effects.back());

@@ -297,7 +297,7 @@ std::string in_words(std::string text, const std::vector<Effect>& catalogue) {
       ++end;
     }
     const std::string word = text.substr(at, end - at);
-    const bool effect = !quoted && std::ranges::find(catalogue, word, &Effect::name) != catalogue.end();
+    const bool effect = !quoted && gap::find_effect(catalogue, word) != nullptr;
     out += effect ? effect_noun(word) : word;
     if (effect && text.compare(end, 3, " + ") == 0) {
       out += " with ";
