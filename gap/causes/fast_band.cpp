@@ -30,14 +30,7 @@ Signal banded_rate(const Drive& drive, const Band& band, const Signal& signal) {
 
 std::vector<Eigen::Index> band_rows(const Drive& drive, const Band& band, double row_step) {
   const Mask use = settled(drive, band.slow) && moving(drive, band.slow);
-  const auto apart = std::max<Eigen::Index>(1, std::lround(row_step / (band.fast * drive.step)));
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index k = 0; k < drive.rows(); k += apart) {
-    if (use[k]) {
-      rows.push_back(k);
-    }
-  }
-  return rows;
+  return rows_apart(drive, use, row_step, band.fast);
 }
 
 // Column `column` in the band, one part for each output.

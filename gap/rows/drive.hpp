@@ -142,4 +142,7 @@ void smooth_quadratic(std::span<const double> signal, std::size_t window, std::s
 /// is any number, and no model of motion says anything about it. None for a drive without efforts.
 [[nodiscard]] Mask moving(const Drive& drive, double beta, double share = 0.02);
 
+/// The rows that `use` marks among every so many that are about `row_step`/β apart, from the first row on.
+[[nodiscard]] std::vector<Eigen::Index> rows_apart(const Drive& drive, const Mask& use, double row_step, double beta);
+
 }  // namespace wheelwright::gap

@@ -138,4 +138,15 @@ Mask moving(const Drive& drive, double beta, double share) {
   return mask;
 }
 
+std::vector<Eigen::Index> rows_apart(const Drive& drive, const Mask& use, double row_step, double beta) {
+  const auto apart = std::max<Eigen::Index>(1, std::lround(row_step / (beta * drive.step)));
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index k = 0; k < drive.rows(); k += apart) {
+    if (use[k]) {
+      rows.push_back(k);
+    }
+  }
+  return rows;
+}
+
 }  // namespace wheelwright::gap

@@ -228,15 +228,7 @@ std::vector<Eigen::Index> effort_rows(const Drive& drive, const GapRowOptions& o
   if (options.skip_rest) {
     use = use && moving(drive, options.beta);
   }
-  const auto apart =
-      std::max<Eigen::Index>(1, static_cast<Eigen::Index>(std::lround(options.row_step / (options.beta * drive.step))));
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index k = 0; k < drive.rows(); k += apart) {
-    if (use[k]) {
-      rows.push_back(k);
-    }
-  }
-  return rows;
+  return rows_apart(drive, use, options.row_step, options.beta);
 }
 
 RowSpace pose_space(std::string name, const Eigen::VectorXd& t, const Eigen::VectorXd& values, double floor) {
