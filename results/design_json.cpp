@@ -24,17 +24,15 @@ const char* name(design::Promise guarantee) {
   return guarantee == design::Promise::at_risk ? "at_risk" : "every_noise";
 }
 
-Json optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
-
 // What all designs have.
 Json frame(const design::Manoeuvre& manoeuvre, const std::optional<design::FigureEight>& eight,
            const design::MotionLimits& limits) {
   Json out = {{"schema", "wheelwright/design/1"}};
   out["limits"] = {{"duration", limits.duration},
                    {"speed", limits.joint_speed},
-                   {"acceleration", optional(limits.joint_acceleration)},
-                   {"effort", optional(limits.effort)},
-                   {"radius", optional(limits.radius)},
+                   {"acceleration", files::or_null(limits.joint_acceleration)},
+                   {"effort", files::or_null(limits.effort)},
+                   {"radius", files::or_null(limits.radius)},
                    {"box", nullptr}};
   if (limits.box) {
     const auto& [x, y] = *limits.box;

@@ -436,7 +436,7 @@ Json to_json(const commission::DetectorChoice& choice, const std::string& robot,
       const std::optional<double> from = commission::risk_decides_from(margin, choice.window);
       decides.push_back({{"fault", margin.fault},
                          {"side", margin.side > 0.0 ? "positive" : "negative"},
-                         {"at_risk_from", from ? Json(*from) : Json(nullptr)}});
+                         {"at_risk_from", files::or_null(from)}});
     }
   }
   return {{"schema", kChoiceSchema},

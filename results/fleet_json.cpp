@@ -25,8 +25,6 @@ constexpr files::Words<study::RobotStatus, 5> status_words = {{{study::RobotStat
                                                                {study::RobotStatus::nothing, "nothing"},
                                                                {study::RobotStatus::unreadable, "unreadable"}}};
 
-Json maybe(const std::optional<double>& x) { return x ? Json(*x) : Json(nullptr); }
-
 // A number of a record; what is computed of one beyond these sizes is none.
 double sized(const JsonPlace& place) {
   constexpr double largest = 1e100;
@@ -47,9 +45,9 @@ Json log_json(const study::LogRecord& log) {
     parameters.push_back({{"name", p.name},
                           {"unit", p.unit},
                           {"is_prior_key", p.is_prior_key},
-                          {"estimate", maybe(p.estimate)},
-                          {"standard_error", maybe(p.standard_error)},
-                          {"freedom", maybe(p.freedom)},
+                          {"estimate", files::or_null(p.estimate)},
+                          {"standard_error", files::or_null(p.standard_error)},
+                          {"freedom", files::or_null(p.freedom)},
                           {"lower", p.lower},
                           {"upper", p.upper},
                           {"lower_is_prior", p.lower_is_prior},
@@ -213,14 +211,14 @@ std::string record_text(const study::RobotRecord& record) {
                                {"instants", o.instants},
                                {"false_alarms", o.false_alarms}});
   }
-  json["smallest_radius_change"] = maybe(record.smallest_radius_change);
+  json["smallest_radius_change"] = files::or_null(record.smallest_radius_change);
   json["checks"] = Json::array();
   for (const study::CheckRecord& c : record.checks) {
     json["checks"].push_back({{"log", log_json(c.log)},
                               {"checked", c.checked},
                               {"not_checked", c.not_checked},
                               {"events", c.events},
-                              {"first", maybe(c.first)},
+                              {"first", files::or_null(c.first)},
                               {"instants", c.instants},
                               {"outside_share", c.outside_share}});
   }

@@ -18,6 +18,14 @@ using files::word_of;
 
 using namespace words;
 
+Json files_json(const logs::LogReport& data) {
+  Json files = Json::array();
+  for (const logs::LogFileReport& f : data.files) {
+    files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
+  }
+  return files;
+}
+
 Json numbers(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
 
 Json candidates_json(const identify::EstimatorChoice& choice) {
@@ -334,16 +342,9 @@ Json kinematics_json(const std::optional<inference::KinematicCalibration>& k) {
 }
 
 Json data_json(const commission::Survey& survey, const logs::LogReport& data) {
-  Json files = Json::array();
-  for (const logs::LogFileReport& f : data.files) {
-    files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
-  }
-  return {{"files", files},
-          {"rows", survey.rows},
-          {"segments", survey.segments},
-          {"seconds", survey.seconds},
-          {"median_step", survey.median_step},
-          {"repairs", logs::sentences(data)}};
+  return {{"files", files_json(data)},         {"rows", survey.rows},
+          {"segments", survey.segments},       {"seconds", survey.seconds},
+          {"median_step", survey.median_step}, {"repairs", logs::sentences(data)}};
 }
 
 }  // namespace

@@ -16,6 +16,9 @@ namespace wheelwright::results {
 /// The numbers of `v` as an array.
 [[nodiscard]] Json numbers(const Eigen::VectorXd& v);
 
+/// The files of a log, with their sizes and hashes.
+[[nodiscard]] Json files_json(const logs::LogReport& data);
+
 /// All candidates of `choice`, in their order (definition estimator_candidate of model.schema.json).
 [[nodiscard]] Json candidates_json(const identify::EstimatorChoice& choice);
 

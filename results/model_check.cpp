@@ -11,6 +11,7 @@
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
 #include "model/filter/row_stream.hpp"
+#include "results/identification_json.hpp"
 #include "results/model_json.hpp"
 #include "results/risk_check.hpp"
 
@@ -449,10 +450,7 @@ Json risk_json(const RiskCheck& check, const ModelClaims& claims) {
 
 Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::LogReport& data, const CheckedFiles& files,
              const std::string& software) {
-  Json log_files = Json::array(), bounds = Json::array();
-  for (const logs::LogFileReport& file : data.files) {
-    log_files.push_back({{"path", file.path}, {"hash", file.hash}, {"bytes", file.bytes}, {"rows", file.rows}});
-  }
+  Json bounds = Json::array();
   for (const BoundVerdict& each : check.bounds) {
     bounds.push_back(bound_json(each, claims, proof_size(claims, each)));
   }
@@ -464,7 +462,8 @@ Json to_json(const ModelCheck& check, const ModelClaims& claims, const logs::Log
       {"message", verdict(check, claims)},
       {"warrant", core::warrant_word(claims.warrant)},
       {"scope", proof_scope(claims)},
-      {"data", {{"same", check.same_log}, {"rows", data.rows}, {"segments", data.segments}, {"files", log_files}}},
+      {"data",
+       {{"same", check.same_log}, {"rows", data.rows}, {"segments", data.segments}, {"files", files_json(data)}}},
       {"bounds", bounds},
       {"facets", facets_json(check.facets, claims)},
       {"failures", check.failures},

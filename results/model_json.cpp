@@ -445,16 +445,9 @@ Json contradictions_json(const Commissioning& r) {
 }
 
 Json data_json(const Commissioning& r, const logs::LogReport& data) {
-  Json files = Json::array();
-  for (const logs::LogFileReport& f : data.files) {
-    files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
-  }
-  return {{"files", files},
-          {"rows", r.survey.rows},
-          {"segments", r.survey.segments},
-          {"seconds", r.survey.seconds},
-          {"median_step", r.survey.median_step},
-          {"largest_step", r.survey.largest_step},
+  return {{"files", files_json(data)},           {"rows", r.survey.rows},
+          {"segments", r.survey.segments},       {"seconds", r.survey.seconds},
+          {"median_step", r.survey.median_step}, {"largest_step", r.survey.largest_step},
           {"repairs", logs::sentences(data)}};
 }
 

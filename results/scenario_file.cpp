@@ -30,10 +30,6 @@ constexpr std::uint64_t largest_seed = std::uint64_t{1} << 53;
 
 using Names = std::vector<std::string>;
 
-double any_number(const YamlPlace& place) {
-  return place.number("a number", [](double) { return true; });
-}
-
 double not_negative(const YamlPlace& place) {
   return place.number("a number >= 0", [](double value) { return value >= 0.0; });
 }
@@ -44,7 +40,7 @@ Eigen::Vector3d pose_at(const YamlPlace& place) {
   if (elements.size() != 3) {
     place.fail(expected);
   }
-  return {any_number(elements[0]), any_number(elements[1]), any_number(elements[2])};
+  return {elements[0].number(), elements[1].number(), elements[2].number()};
 }
 
 // The text of the mapping under the root's key `robot` alone, on the lines where it stands, so that messages name them.
@@ -283,16 +279,16 @@ struct ScenarioReader {
         fault.kind = kinds.at(value.choice(names));
       } else if (name == "magnitude") {
         magnitude = true;
-        fault.magnitude = any_number(value);
+        fault.magnitude = value.number();
       } else if (name == "onset") {
-        fault.profile.onset = any_number(value);
+        fault.profile.onset = value.number();
       } else if (name == "shape") {
         constexpr std::array shapes = {FaultProfile::Kind::step, FaultProfile::Kind::ramp, FaultProfile::Kind::smooth};
         fault.profile.shape = shapes.at(value.choice({"step", "ramp", "smooth"}));
       } else if (name == "rise_time") {
         fault.profile.rise_time = not_negative(value);
       } else {
-        fault.profile.end = any_number(value);
+        fault.profile.end = value.number();
       }
     }
     if (!kind || !magnitude) {

@@ -28,10 +28,6 @@ namespace {
 constexpr std::uint64_t kLargestSeed = std::uint64_t{1} << 53;
 constexpr std::size_t kLongestFile = std::size_t{1} << 20;
 
-double number_at(const YamlPlace& place) {
-  return place.number("a number", [](double) { return true; });
-}
-
 constexpr Eigen::Index kMostPoints = 100'000;  // of a method, for each input that it moves
 
 Eigen::Index whole_from(const YamlPlace& place, int least) {
@@ -44,7 +40,7 @@ std::pair<double, double> two_numbers(const YamlPlace& place) {
   if (ends.size() != 2) {
     place.fail(expected);
   }
-  const std::pair<double, double> range = {number_at(ends[0]), number_at(ends[1])};
+  const std::pair<double, double> range = {ends[0].number(), ends[1].number()};
   if (!(range.first < range.second)) {
     place.fail(expected);
   }
@@ -170,7 +166,7 @@ struct StudyReader {
         } else if (key == "scale") {
           input.logarithmic = value.choice({"linear", "log"}) == 1;
         } else {
-          nominal = number_at(value);
+          nominal = value.number();
         }
       }
     } else {

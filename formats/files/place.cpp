@@ -200,6 +200,10 @@ double YamlPlace::number(std::string_view expected, const std::function<bool(dou
   return *value;
 }
 
+double YamlPlace::number() const {
+  return number("a number", [](double) { return true; });
+}
+
 double YamlPlace::positive() const {
   return number("a number > 0", [](double value) { return value > 0.0; });
 }

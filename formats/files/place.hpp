@@ -65,6 +65,8 @@ class YamlPlace {
   void demand(const std::string& word) const;
   /// A finite number (not in quotes) for which `accepted` holds.
   [[nodiscard]] double number(std::string_view expected, const std::function<bool(double)>& accepted) const;
+  /// A finite number.
+  [[nodiscard]] double number() const;
   /// A number > 0.
   [[nodiscard]] double positive() const;
   /// A whole number from `least` to `most`, which is at most 2⁵³: whole numbers beyond it are not all doubles.
