@@ -23,15 +23,9 @@ namespace {
 
 constexpr std::size_t kWidth = 110;  // of a line of words
 
-// Columns that a terminal shows: bytes that begin a character.
-std::size_t columns(std::string_view text) {
-  return static_cast<std::size_t>(
-      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
-}
-
 // `text` in lines, the first one after `first` and the others as deep.
 std::string wrapped(std::string_view text, const std::string& first) {
-  const std::string indent(columns(first), ' ');
+  const std::string indent(text_width(first), ' ');
   std::string out = first, line;
   const auto flush = [&] {
     out += line + "\n";
@@ -41,7 +35,7 @@ std::string wrapped(std::string_view text, const std::string& first) {
   while (at < text.size()) {
     const std::size_t end = std::min(text.find(' ', at), text.size());
     const std::string_view word = text.substr(at, end - at);
-    if (!line.empty() && columns(line) + columns(word) + 1 + indent.size() > kWidth) {
+    if (!line.empty() && text_width(line) + text_width(word) + 1 + indent.size() > kWidth) {
       flush();
       out += indent;
     }
@@ -59,14 +53,14 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows) {
   for (const auto& row : rows) {
     width.resize(std::max(width.size(), row.size()), 0);
     for (std::size_t c = 0; c < row.size(); ++c) {
-      width[c] = std::max(width[c], columns(row[c]));
+      width[c] = std::max(width[c], text_width(row[c]));
     }
   }
   std::string out;
   for (const auto& row : rows) {
     std::string line = " ";
     for (std::size_t c = 0; c < row.size(); ++c) {
-      const std::string blanks(width[c] - columns(row[c]), ' ');
+      const std::string blanks(width[c] - text_width(row[c]), ' ');
       line += c == 0 ? " " + row[c] + blanks : "  " + blanks + row[c];
     }
     out += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";

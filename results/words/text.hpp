@@ -54,11 +54,15 @@ namespace wheelwright::words {
 /// interval has no width.
 [[nodiscard]] std::string beside(double x, double lower, double upper);
 
-/// UTF-8 `text` filled with blanks to `width` columns, one blank at least where it is longer. Columns count what is
-/// seen: a dash is one column and three bytes.
-[[nodiscard]] inline std::string padded(std::string text, std::size_t width) {
-  const auto columns = static_cast<std::size_t>(
+/// Columns that a terminal shows of UTF-8 `text`: a dash is one column and three bytes.
+[[nodiscard]] inline std::size_t text_width(std::string_view text) {
+  return static_cast<std::size_t>(
       std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+/// UTF-8 `text` filled with blanks to `width` columns, one blank at least where it is longer.
+[[nodiscard]] inline std::string padded(std::string text, std::size_t width) {
+  const std::size_t columns = text_width(text);
   text.append(columns < width ? width - columns : 1, ' ');
   return text;
 }
