@@ -7,11 +7,13 @@
 #include "tests/benchmarks/peers/confidence_threshold.hpp"
 #include "tests/benchmarks/peers/cusum.hpp"
 #include "tests/benchmarks/peers/innovations.hpp"
+#include "tests/support/exact_axis.hpp"
 #include "tests/support/random.hpp"
 
 namespace wheelwright::peers {
 namespace {
 
+using testing_support::AxisMotion;
 using testing_support::Random;
 
 // Mean number of samples to an alarm at S > `limit` when z has the mean `shift`.
@@ -46,23 +48,13 @@ TEST(Cusum, RunLengthsAreSiegmunds) {
   EXPECT_NEAR(run_length(-1.0, 4.0, 4000, 3), siegmund(1.0, 4.0), 0.05 * 8.4);
 }
 
-// m v̇ + f v = u in closed form for a constant u.
-struct Axis {
-  double position = 0.0, speed = 0.0;
-  void advance(double m, double f, double u, double h) {
-    const double e = std::exp(-f * h / m), settled = u / f;
-    position += settled * h + (speed - settled) * (1.0 - e) * m / f;
-    speed = settled + (speed - settled) * e;
-  }
-};
-
 TEST(Innovations, HaveTwoDegreesOfFreedomASampleOnHealthyData) {
   constexpr double m = 3.0, f = 1.5, h = 0.01, effort_sd = 0.2, position_sd = 1e-4;
   const AxisModel model{m, f, effort_sd * effort_sd, position_sd * position_sd};
   constexpr std::size_t window = 10;
   Innovations single({model, model}, Hold::zero_order, 1), windowed({model, model}, Hold::zero_order, window);
   Random random(4);
-  std::array<Axis, kOutputs> axes;
+  std::array<AxisMotion, kOutputs> axes;
   Observation now;
   double sum = 0.0, window_sum = 0.0, tail = 0.0, product = 0.0, before = 0.0;
   constexpr int count = 100'000;
@@ -94,7 +86,7 @@ TEST(Innovations, HaveTwoDegreesOfFreedomASampleOnHealthyData) {
 TEST(Innovations, VanishForAnExactLogWithLinearEfforts) {
   constexpr double m = 3.0, f = 1.5, h = 0.02;
   AxisFilter filter({m, f, 1e-4, 1e-12}, Hold::first_order);
-  Axis axis;
+  AxisMotion axis;
   for (int k = 0; k < 500; ++k) {
     const double t = h * k, u = k % 2 == 0 ? 1.0 : -0.5, next = k % 2 == 0 ? -0.5 : 1.0;
     const AxisFilter::Innovation now = filter.step(t, axis.position, u);

@@ -77,23 +77,12 @@ void watch(const OnlineModel& model, const Scenario& drive, Watch& total) {
   Simulation log(drive);
   Detector detector = make_detector(model);
   ASSERT_TRUE(detector.threshold().set().has_vertices());
-  std::vector<std::size_t> pick;
-  for (const auto& name : model.measurement.columns()) {
-    pick.push_back(log.find(name).value());
-  }
-  std::vector<double> sample(pick.size());
-  LogBlock block;
-  while (log.next(block)) {
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        sample[c] = block.columns[pick[c]][k];
-      }
-      const Decision& d = detector.step(block.t[k], sample);
-      ++total.samples;
-      total.decisions += d.valid ? 1 : 0;
-      total.alarms += d.fault ? 1 : 0;
-    }
-  }
+  core::for_each_sample(log, model.measurement.columns(), [&](const core::LogSample& sample) {
+    const Decision& d = detector.step(sample.t, sample.values);
+    ++total.samples;
+    total.decisions += d.valid ? 1 : 0;
+    total.alarms += d.fault ? 1 : 0;
+  });
 }
 
 // Ten robots, each on other trajectories than the one it was commissioned on: 10⁷ samples with the polytope's [l, u].

@@ -62,21 +62,10 @@ double first_alarm(const Prepared& p, const Plan& plan, const PromisedFault& fau
   }
   Simulation log(s);
   Detector detector = make_detector(p.model);
-  std::vector<std::size_t> pick;
-  for (const auto& name : p.model.measurement.columns()) {
-    pick.push_back(log.find(name).value());
-  }
-  std::vector<double> sample(pick.size());
   double first = core::kInfinity;
-  LogBlock block;
-  while (log.next(block)) {
-    for (std::size_t k = 0; k < block.rows(); ++k) {
-      for (std::size_t c = 0; c < pick.size(); ++c) {
-        sample[c] = block.columns[pick[c]][k];
-      }
-      first = detector.step(block.t[k], sample).fault ? std::min(first, block.t[k]) : first;
-    }
-  }
+  core::for_each_sample(log, p.model.measurement.columns(), [&](const core::LogSample& sample) {
+    first = detector.step(sample.t, sample.values).fault ? std::min(first, sample.t) : first;
+  });
   return first;
 }
 

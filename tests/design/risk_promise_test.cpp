@@ -104,18 +104,10 @@ double first_alarm(const Robot& robot, const OnlineModel& model, const Plan& pla
   s.faults = faults;
   Simulation log(s);
   detector::ScaleDetector detector(model);
-  std::vector<std::size_t> pick;
-  for (const auto& name : model.measurement.columns()) {
-    pick.push_back(log.find(name).value());
-  }
-  std::vector<double> sample(pick.size());
   double first = core::kInfinity;
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool) {
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    if (detector.step(block.t[k], sample) && detector.alarm()) {
-      first = std::min(first, block.t[k]);
+  core::for_each_sample(log, model.measurement.columns(), [&](const core::LogSample& sample) {
+    if (detector.step(sample.t, sample.values) && detector.alarm()) {
+      first = std::min(first, sample.t);
     }
   });
   return first;

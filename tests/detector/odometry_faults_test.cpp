@@ -166,21 +166,10 @@ TEST(OdometryFaults, LateralSlipOnAStraightLineIsForThePose) {
         {.kind = Fault::Kind::unmatched, .magnitude = each.side * summary.worst, .profile = {.onset = 6.0}}};
     Simulation broken(faulty);
     KinematicDetector detector = make_detector(k);
-    std::vector<std::size_t> pick;
-    for (const auto& name : k.measurement.columns()) {
-      pick.push_back(broken.find(name).value());
-    }
-    std::vector<double> sample(pick.size());
     double first = core::kInfinity;
-    LogBlock block;
-    while (broken.next(block)) {
-      for (std::size_t row = 0; row < block.rows(); ++row) {
-        for (std::size_t c = 0; c < pick.size(); ++c) {
-          sample[c] = block.columns[pick[c]][row];
-        }
-        first = detector.step(block.t[row], sample).fault ? std::min(first, block.t[row]) : first;
-      }
-    }
+    core::for_each_sample(broken, k.measurement.columns(), [&](const core::LogSample& sample) {
+      first = detector.step(sample.t, sample.values).fault ? std::min(first, sample.t) : first;
+    });
     EXPECT_GT(first, 6.0);
     EXPECT_LE(first, 7.0 + 0.02);
   }
@@ -265,21 +254,10 @@ void keep_promises(std::uint64_t first, std::uint64_t last, int& certain) {
       ++certain;
       Simulation broken(with(size, true));
       KinematicDetector detector = make_detector(k);
-      std::vector<std::size_t> pick;
-      for (const auto& name : k.measurement.columns()) {
-        pick.push_back(broken.find(name).value());
-      }
-      std::vector<double> sample(pick.size());
       double alarm = core::kInfinity;
-      LogBlock block;
-      while (broken.next(block)) {
-        for (std::size_t row = 0; row < block.rows(); ++row) {
-          for (std::size_t c = 0; c < pick.size(); ++c) {
-            sample[c] = block.columns[pick[c]][row];
-          }
-          alarm = detector.step(block.t[row], sample).fault ? std::min(alarm, block.t[row]) : alarm;
-        }
-      }
+      core::for_each_sample(broken, k.measurement.columns(), [&](const core::LogSample& sample) {
+        alarm = detector.step(sample.t, sample.values).fault ? std::min(alarm, sample.t) : alarm;
+      });
       ASSERT_GE(alarm, onset) << kind.name << ", seed " << seed;
       ASSERT_LE(alarm, onset + 1.5 + 1.0 / drive.rate) << kind.name << " of " << side * size << ", seed " << seed;
     }

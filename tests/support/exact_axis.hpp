@@ -50,6 +50,17 @@ struct ExactAxis {
   double fault_at = 1e300, fault_bias = 0.0;  ///< s, N: a bias of the efforts' readings
 };
 
+/// Position and speed of m v̇ = u − f v.
+struct AxisMotion {
+  double position = 0.0, speed = 0.0;  ///< m, m/s
+  /// Lets `u` act for `h` s.
+  void advance(double mass, double viscous, double u, double h) {
+    const double e = std::exp(-viscous / mass * h), end = u / viscous;
+    position += end * h + (speed - end) * (1.0 - e) * mass / viscous;
+    speed = end + (speed - end) * e;
+  }
+};
+
 inline constexpr double kRecent = 0.1;  ///< s, memory of ErrorLaw::follower and echo
 
 /// Its log (position, effort).
@@ -60,7 +71,9 @@ inline LogTable drive(const ExactAxis& a, std::uint64_t seed) {
   log.names = {"position", "effort"};
   log.columns.resize(2);
   const auto rows = static_cast<std::size_t>(a.rate * a.seconds);
-  double x = 0.0, v = 0.0, t = 0.0, measured = 0.0, before = 0.0, sum = 0.0, held = 1.0;
+  AxisMotion motion;
+  const double &x = motion.position, &v = motion.speed;
+  double t = 0.0, measured = 0.0, before = 0.0, sum = 0.0, held = 1.0;
   double until = -1.0, recent = 0.0, alike = 0.0;
   double phase[4];
   for (double& p : phase) {
@@ -116,9 +129,7 @@ inline LogTable drive(const ExactAxis& a, std::uint64_t seed) {
     log.t.push_back(t);
     log.columns[0].push_back(measured);
     log.columns[1].push_back(u + error + lean * a.bias + (t >= a.fault_at ? a.fault_bias : 0.0));
-    const double e = std::exp(-a.viscous / a.mass * h), end = u / a.viscous;
-    x += end * h + (v - end) * (1.0 - e) * a.mass / a.viscous;
-    v = end + (v - end) * e;
+    motion.advance(a.mass, a.viscous, u, h);
     t += h;
   }
   return log;
