@@ -18,44 +18,6 @@ using files::word_of;
 
 using namespace words;
 
-Json files_json(const logs::LogReport& data) {
-  Json files = Json::array();
-  for (const logs::LogFileReport& f : data.files) {
-    files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
-  }
-  return files;
-}
-
-Json numbers(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
-
-Json candidates_json(const identify::EstimatorChoice& choice) {
-  Json list = Json::array();
-  for (const identify::EstimatorCandidate& c : choice.candidates) {
-    Json candidate = {{"estimator", identify::to_string(c.estimate.estimator)},
-                      {"origin", c.origin},
-                      {"usable", c.estimate.usable},
-                      {"reason", c.estimate.reason},
-                      {"estimate", numbers(c.estimate.theta)},
-                      {"standard_error", numbers(c.estimate.standard_error)},
-                      {"freedom", c.estimate.freedom}};
-    if (c.strength.size() > 0) {
-      candidate["instrument_strength"] = numbers(c.strength);
-      candidate["instrument_relevance"] = numbers(c.relevance);
-    }
-    list.push_back(candidate);
-  }
-  return list;
-}
-
-Json endogeneity_json(const identify::EstimatorChoice& choice) {
-  if (!choice.tested_against || !choice.test.made) {
-    return nullptr;
-  }
-  return {{"against", identify::to_string(choice.candidates[*choice.tested_against].estimate.estimator)},
-          {"F", choice.test.statistic},
-          {"p_value", choice.test.p_value}};
-}
-
 namespace {
 
 constexpr files::Words<IdentificationStanding, 3> kStandingWords{{{IdentificationStanding::good, "good"},

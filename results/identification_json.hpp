@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// identification.json: the result of an identification; the choice of an estimator, alike in model.json.
+/// identification.json: the result of an identification.
 #pragma once
 
 #include <cstdint>
@@ -8,22 +8,9 @@
 
 #include "formats/files/json.hpp"
 #include "formats/logs/recorded_log.hpp"
-#include "identify/estimate.hpp"
 #include "identify/inference/identification.hpp"
 
 namespace wheelwright::results {
-
-/// The numbers of `v` as an array.
-[[nodiscard]] Json numbers(const Eigen::VectorXd& v);
-
-/// The files of a log, with their sizes and hashes.
-[[nodiscard]] Json files_json(const logs::LogReport& data);
-
-/// All candidates of `choice`, in their order (definition estimator_candidate of model.schema.json).
-[[nodiscard]] Json candidates_json(const identify::EstimatorChoice& choice);
-
-/// Durbin, Wu and Hausman's test (definition endogeneity_test); null where it was not made.
-[[nodiscard]] Json endogeneity_json(const identify::EstimatorChoice& choice);
 
 /// Name of the format: the value of its key `schema`.
 inline constexpr const char* kIdentificationSchema = "wheelwright/identification/1";

@@ -8,7 +8,6 @@
 #include "formats/files/json.hpp"
 #include "formats/files/words.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "results/identification_json.hpp"
 #include "results/model_file.hpp"
 #include "results/model_json.hpp"
 

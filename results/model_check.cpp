@@ -11,7 +11,6 @@
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
 #include "model/filter/row_stream.hpp"
-#include "results/identification_json.hpp"
 #include "results/model_json.hpp"
 #include "results/risk_check.hpp"
 

@@ -14,12 +14,49 @@
 #include "formats/files/json.hpp"
 #include "formats/files/words.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "results/identification_json.hpp"
 #include "results/model_file.hpp"
 
 namespace wheelwright::results {
 
 using files::word_of;
+
+Json numbers(const Eigen::VectorXd& v) { return std::vector<double>(v.begin(), v.end()); }
+
+Json files_json(const logs::LogReport& data) {
+  Json files = Json::array();
+  for (const logs::LogFileReport& f : data.files) {
+    files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
+  }
+  return files;
+}
+
+Json candidates_json(const identify::EstimatorChoice& choice) {
+  Json list = Json::array();
+  for (const identify::EstimatorCandidate& c : choice.candidates) {
+    Json candidate = {{"estimator", identify::to_string(c.estimate.estimator)},
+                      {"origin", c.origin},
+                      {"usable", c.estimate.usable},
+                      {"reason", c.estimate.reason},
+                      {"estimate", numbers(c.estimate.theta)},
+                      {"standard_error", numbers(c.estimate.standard_error)},
+                      {"freedom", c.estimate.freedom}};
+    if (c.strength.size() > 0) {
+      candidate["instrument_strength"] = numbers(c.strength);
+      candidate["instrument_relevance"] = numbers(c.relevance);
+    }
+    list.push_back(candidate);
+  }
+  return list;
+}
+
+Json endogeneity_json(const identify::EstimatorChoice& choice) {
+  if (!choice.tested_against || !choice.test.made) {
+    return nullptr;
+  }
+  return {{"against", identify::to_string(choice.candidates[*choice.tested_against].estimate.estimator)},
+          {"F", choice.test.statistic},
+          {"p_value", choice.test.p_value}};
+}
 
 Json sides_json(const Box& box) {
   Json json = Json::array();

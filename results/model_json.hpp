@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// The words and parts of model.json that other results have too: warrants, assumptions, error classes, the section
-/// `kinematic`.
+/// The words and parts of model.json that other results have too: warrants, assumptions, error classes, the choice of
+/// an estimator, the section `kinematic`.
 #pragma once
 
 #include <optional>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "commission/commission.hpp"
 #include "commission/kinematic.hpp"
 #include "core/warrant.hpp"
 #include "formats/files/json.hpp"
 #include "formats/files/words.hpp"
+#include "formats/logs/recorded_log.hpp"
 #include "formats/robots/robot_keys.hpp"
+#include "identify/estimate.hpp"
 #include "model/filter/error_class.hpp"
 
 namespace wheelwright::results {
@@ -29,6 +33,18 @@ inline constexpr files::Words<identify::Excitation, 3> kExcitationWords{
      {identify::Excitation::not_excited, "not_excited"}}};
 inline constexpr files::Words<bounds::Side, 2> kSideWords{
     {{bounds::Side::upper, "upper"}, {bounds::Side::lower, "lower"}}};
+
+/// The numbers of `v` as an array.
+[[nodiscard]] Json numbers(const Eigen::VectorXd& v);
+
+/// The files of a log, with their sizes and hashes.
+[[nodiscard]] Json files_json(const logs::LogReport& data);
+
+/// All candidates of `choice`, in their order (definition estimator_candidate of model.schema.json).
+[[nodiscard]] Json candidates_json(const identify::EstimatorChoice& choice);
+
+/// Durbin, Wu and Hausman's test (definition endogeneity_test); null where it was not made.
+[[nodiscard]] Json endogeneity_json(const identify::EstimatorChoice& choice);
 
 /// The list as results have it under `assumptions`.
 [[nodiscard]] Json assumptions_json(const std::vector<core::Assumption>& assumptions);
