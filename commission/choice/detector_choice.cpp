@@ -404,20 +404,6 @@ class Search {
 
 }  // namespace
 
-std::optional<double> risk_decides_from(const StatedMargin& margin, double window) {
-  if (!margin.at_risk) {
-    return std::nullopt;
-  }
-  const std::vector<double>&every_noise = margin.medians, &at_risk = margin.at_risk->medians;
-  std::size_t from = at_risk.size();
-  while (from > 0 && at_risk[from - 1] < every_noise[from - 1]) {
-    --from;
-  }
-  return from < at_risk.size()
-             ? std::optional(window * static_cast<double>(from + 1) / static_cast<double>(at_risk.size()))
-             : std::nullopt;
-}
-
 bool better(const DetectorCandidate& a, const DetectorCandidate& b, double least, double tie) {
   const auto key = [&](const DetectorCandidate& candidate) {
     const bool tied = candidate.size <= least * (1.0 + tie);
