@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -12,8 +13,19 @@ class App;
 
 namespace wheelwright::app {
 
-/// A command that was added: `run` does its work.
+/// What does the work of a command that was added, and returns an exit code.
 using Run = std::function<int(const std::string& command_line)>;
+
+/// A command that was added to the program.
+struct Command {
+  std::string name;
+  Run run;
+};
+
+/// Adds the commands of this program to `program`, in the order of its help. The program itself has all of them
+/// (all_commands.cpp); that of the first half of the build says of those which it lacks what builds them
+/// (first_commands.cpp).
+[[nodiscard]] std::vector<Command> add_commands(CLI::App& program);
 
 /// wheelwright check model.json LOG...
 [[nodiscard]] Run add_check(CLI::App& program);

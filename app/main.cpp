@@ -71,28 +71,6 @@ void end_when_interrupted() {
   }).detach();
 }
 
-std::vector<std::pair<std::string, Run>> add_commands(CLI::App& program) {
-  return {{"try", add_try(program)},
-          {"commission", add_commission(program)},
-          {"detect", add_detect(program)},
-          {"doctor", add_doctor(program)},
-          {"check", add_check(program)},
-          {"compare", add_compare(program)},
-          {"identify", add_identify(program)},
-          {"margins", add_margins(program)},
-          {"sensitivity", add_sensitivity(program)},
-          {"export", add_export(program)},
-          {"design", add_design(program)},
-          {"simulate", add_simulate(program)},
-          {"choose", add_choose(program)},
-          {"gap", add_gap(program)},
-          {"fleet", add_fleet(program)},
-          {"convert", add_convert(program)},
-          {"robot", add_robot(program)},
-          {"completion", add_completion(program)},
-          {"man", add_man(program)}};
-}
-
 int without_thread(const std::system_error& error) {
   tell_error(fmt::format("no thread can be started ({}): expected room for more of them: ulimit -u, or fewer --threads",
                          error.code().message()));
@@ -112,7 +90,7 @@ int run(int argc, char** argv) {
       "Start with:  wheelwright try BAG --urdf robot.urdf, or wheelwright commission LOG --robot robot.yaml --out "
       "result\n"
       "Each command has its own --help.");
-  const std::vector<std::pair<std::string, Run>> commands = add_commands(program);
+  const std::vector<Command> commands = add_commands(program);
   program.failure_message([argc, argv, &program](const CLI::App*, const CLI::Error& error) {
     const std::string meant = suggestion(words_of(program), {argv + 1, argv + argc});
     return fmt::format("wheelwright: {}{}\nRun with --help for more information.\n", error.what(),

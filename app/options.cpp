@@ -115,24 +115,6 @@ void add_test(CLI::App& command, detector::Test& test) {
       ->type_name("TEST");
 }
 
-void add_scale_options(CLI::App& command, ScaleOptions& options) {
-  command
-      .add_option_function<std::string>(
-          "--shard",
-          [&options](const std::string& text) {
-            options.shard = shard_of(text);
-            if (!options.shard) {
-              throw CLI::ValidationError("--shard '" + text + "': expected I/N with 1 <= I <= N, e.g. 3/7",
-                                         CLI::ExitCodes::ValidationError);
-            }
-          },
-          "Evaluate the Ith of N parts only, into its own file in --out; --merge takes the parts together")
-      ->type_name("I/N");
-  command.add_flag("--merge", options.merge, "Take together what the shards in --out evaluated; evaluate nothing");
-  command.add_flag("--fresh", options.fresh,
-                   "Throw away what an earlier run left in --out, instead of going on with it");
-}
-
 namespace {
 
 std::string if_empty(const OptionWords& option, const std::string& value) {

@@ -12,7 +12,7 @@
 #
 #   include(EmbedText)
 #   wheelwright_find_uplot(uplot_js uplot_css)
-#   wheelwright_embed(wheelwright_report report_assets.hpp uplot_js=${uplot_js} uplot_css=${uplot_css})
+#   wheelwright_embed(wheelwright_report_first report_assets.hpp uplot_js=${uplot_js} uplot_css=${uplot_css})
 
 if(CMAKE_SCRIPT_MODE_FILE STREQUAL CMAKE_CURRENT_LIST_FILE)
   # cmake -DOUTPUT=header -DENTRIES=name=path,name=path -P EmbedText.cmake

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# wheelwright_room(NAME [PROGRAM_ONLY] [WORDS] [HEADERS h...] [SHARED h...] [SOURCES s...] [HOT s...]
-#                  [BATCH n] [USES room...] [LINK lib...] [LINK_PRIVATE lib...])
+# wheelwright_room(NAME [PROGRAM_ONLY] [WORDS] [HEADERS h...] [SHARED h...] [SOURCES s...] [FIRST s...]
+#                  [HOT s...] [BATCH n] [USES room...] [FIRST_USES room...] [LINK lib...] [LINK_PRIVATE lib...])
 #
 # One target per room: wheelwright_NAME, alias Wheelwright::NAME. Sources here include a header by its path from the root of
 # the repository, "NAME/x.hpp"; programs that use the library include <wheelwright/NAME/x.hpp>, in the build tree by a header
@@ -10,6 +10,9 @@
 # PROGRAM_ONLY serves our own programs and is not installed. In a release WORDS, which says and writes what others found, is
 # optimised for the time of compilation (-O1), other rooms at -O2, and the sources named after HOT at -O3.
 # BATCH: so many sources are compiled as one, where a dozen would take longer than 25 s.
+# FIRST are the sources that the program of the first half of the build needs (app/CMakeLists.txt); they do not stand after
+# SOURCES. They are compiled once, into a library wheelwright_NAME_first, and their objects are in the module's own library,
+# too. FIRST_USES are the modules that they use; of a module that has FIRST sources itself, these alone.
 
 # Of what names none: the rooms are `development`.
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME program)
@@ -65,8 +68,42 @@ function(wheelwright_use_precompiled target name)
   endif()
 endfunction()
 
+# How the sources of a module are compiled. ROOM_… are the arguments of wheelwright_room().
+macro(wheelwright_compile_room target)
+  # No fused multiply-add: batch and streaming, and every machine, give the same digits.
+  target_compile_options(${target} PRIVATE ${WHEELWRIGHT_WARNINGS} -ffp-contract=off)
+  if(ROOM_WORDS)
+    wheelwright_words(${target})
+    wheelwright_use_precompiled(${target} wheelwright_words_pch)
+  else()
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
+    wheelwright_use_precompiled(${target} wheelwright_pch)
+  endif()
+  if(ROOM_BATCH)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE ${ROOM_BATCH})
+  endif()
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+endmacro()
+
+# The library of a module's FIRST sources.
+macro(wheelwright_first_of_room name)
+  add_library(wheelwright_${name}_first STATIC ${ROOM_FIRST})
+  add_library(Wheelwright::${name}_first ALIAS wheelwright_${name}_first)
+  wheelwright_compile_room(wheelwright_${name}_first)
+  target_compile_features(wheelwright_${name}_first PUBLIC cxx_std_20)
+  foreach(room IN LISTS ROOM_FIRST_USES)
+    if(TARGET wheelwright_${room}_first)
+      target_link_libraries(wheelwright_${name}_first PUBLIC Wheelwright::${room}_first)
+    else()
+      target_link_libraries(wheelwright_${name}_first PUBLIC Wheelwright::${room})
+    endif()
+  endforeach()
+  target_link_libraries(wheelwright_${name}_first PUBLIC ${ROOM_LINK} PRIVATE ${ROOM_LINK_PRIVATE})
+endmacro()
+
 function(wheelwright_room name)
-  cmake_parse_arguments(ROOM "PROGRAM_ONLY;WORDS" "BATCH" "HEADERS;SHARED;SOURCES;HOT;USES;LINK;LINK_PRIVATE" ${ARGN})
+  cmake_parse_arguments(ROOM "PROGRAM_ONLY;WORDS" "BATCH"
+    "HEADERS;SHARED;SOURCES;FIRST;HOT;USES;FIRST_USES;LINK;LINK_PRIVATE" ${ARGN})
   file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
   foreach(header IN LISTS ROOM_HEADERS ROOM_SHARED)
     if(NOT EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${header})
@@ -80,21 +117,15 @@ function(wheelwright_room name)
   list(TRANSFORM ROOM_USES PREPEND Wheelwright::)
 
   set(target wheelwright_${name})
+  if(ROOM_FIRST)
+    wheelwright_first_of_room(${name})
+    list(APPEND ROOM_SOURCES $<TARGET_OBJECTS:wheelwright_${name}_first>)
+  endif()
   if(ROOM_SOURCES)
     set(scope PUBLIC)
     add_library(${target} ${ROOM_SOURCES})
-    # No fused multiply-add: batch and streaming, and every machine, give the same digits.
-    target_compile_options(${target} PRIVATE ${WHEELWRIGHT_WARNINGS} -ffp-contract=off)
-    if(ROOM_WORDS)
-      wheelwright_words(${target})
-      wheelwright_use_precompiled(${target} wheelwright_words_pch)
-    else()
-      target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
-      wheelwright_use_precompiled(${target} wheelwright_pch)
-    endif()
-    if(ROOM_BATCH)
-      set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE ${ROOM_BATCH})
-    endif()
+    set_target_properties(${target} PROPERTIES LINKER_LANGUAGE CXX)  # of a library of nothing but FIRST sources, too
+    wheelwright_compile_room(${target})
     set_source_files_properties(${ROOM_HOT} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>
       SKIP_PRECOMPILE_HEADERS ON)
   else()
