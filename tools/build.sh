@@ -19,7 +19,11 @@ if command -v ccache >/dev/null; then
   export CMAKE_CXX_COMPILER_LAUNCHER="${CMAKE_CXX_COMPILER_LAUNCHER-ccache}"
 fi
 if [ ! -f "$directory/build.ninja" ] || { [ "$preset" != "$configured" ] && [ "$preset" != program ]; }; then
-  cmake --preset "$preset"
+  if ! cmake --preset "$preset"; then
+    [ "$preset" = program ] && all=' program' || all=''
+    echo "build: preset $preset cannot be configured; tools/setup.sh$all installs what it needs" >&2
+    exit 1
+  fi
   echo "$preset" > "$directory/preset"
 fi
 jobs=$(nproc 2>/dev/null || echo 2)

@@ -6,12 +6,14 @@ if(NOT PROJECT_IS_TOP_LEVEL OR NOT TARGET wheelwright)
   return()
 endif()
 
-# What the packages hold, and nothing of tests, examples and benchmarks.
+# What `cmake --install` copies, and what the packages hold beside it; nothing of tests, examples and benchmarks.
 get_property(rooms GLOBAL PROPERTY WHEELWRIGHT_ROOMS)
+add_custom_target(installed)
+add_dependencies(installed wheelwright ${rooms})
 add_custom_target(packaged)
-add_dependencies(packaged wheelwright ${rooms})
+add_dependencies(packaged installed)
 if(TARGET wheelwright_shell_files)
-  add_dependencies(packaged wheelwright_shell_files)
+  add_dependencies(installed wheelwright_shell_files)
   # Debian's zsh does not look where others do.
   install(FILES ${CMAKE_BINARY_DIR}/share/_wheelwright DESTINATION share/zsh/vendor-completions COMPONENT program
     EXCLUDE_FROM_ALL)
@@ -27,7 +29,7 @@ install(FILES examples/healthy.csv.gz examples/robot.yaml DESTINATION share/doc/
 file(GLOB schemas CONFIGURE_DEPENDS results/*.schema.json)
 install(FILES ${schemas} DESTINATION share/wheelwright/schemas COMPONENT program)
 
-if(TARGET wheelwright_python)
+if(WHEELWRIGHT_PYTHON_BUILT)
   list(APPEND components python)
   list(APPEND names python3-wheelwright)
   add_dependencies(packaged wheelwright_python)
@@ -132,7 +134,7 @@ This package has the static libraries, the headers and the CMake
 package, one target for each part: a robot that only monitors links
 Wheelwright::detector.")
 
-if(TARGET wheelwright_python)
+if(WHEELWRIGHT_PYTHON_BUILT)
   math(EXPR next "${Python3_VERSION_MINOR} + 1")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-wheelwright)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
