@@ -13,7 +13,7 @@ namespace {
 
 struct LaterCommand {
   const char* name;
-  const char* purpose;  // first sentence of its own help
+  const char* purpose;  // as its own help begins
 };
 
 constexpr std::array<LaterCommand, 10> kLater{{
@@ -24,7 +24,10 @@ constexpr std::array<LaterCommand, 10> kLater{{
     {"margins",
      "Says beforehand which faults a commissioned robot's detector is certain to see, from what size on, how soon, "
      "and in which manoeuvre."},
-    {"sensitivity", "What would a better sensor, another filter or a longer drive buy?"},
+    {"sensitivity",
+     "What would a better sensor, another filter or a longer drive buy? Commissions the robot of a study file at many "
+     "settings of its inputs and says how bounds, thresholds and the smallest faults that are certainly seen depend on "
+     "them."},
     {"export",
      "Writes the detector of a commissioned model as one self-contained source file, with the model's numbers "
      "inside, for a controller that has neither this program nor its library."},

@@ -37,16 +37,13 @@ def run(program, *words, **options):
 
 def commands(program):
     """Heading -> name -> purpose, of the program's help."""
-    headings, purposes = {}, None
+    headings, heading = {}, ""
     for line in run(program, "--help").stdout.splitlines():
         if re.fullmatch(r"\S.*:", line):
-            purposes = headings.setdefault(line, {})
-        elif purposes is not None and (entry := re.fullmatch(r"  ([a-z]+) +(\S.*)", line)):
-            name = entry[1]
-            purposes[name] = entry[2]
-        elif purposes is not None and line.strip():
-            purposes[name] += " " + line.strip()
-    return {heading: entries for heading, entries in headings.items() if heading != "Options:"}
+            heading = line
+        elif entry := re.fullmatch(r"  ([a-z]+) +(\S.*)", line):
+            headings.setdefault(heading, {})[entry[1]] = entry[2]
+    return headings
 
 
 class TheFirstHalf(unittest.TestCase):
