@@ -8,10 +8,12 @@
 #include "app/check_report.hpp"
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
 #include "results/check_words.hpp"
 #include "results/model_check.hpp"
-#include "results/model_file.hpp"
+#include "results/model_claims.hpp"
+#include "results/software.hpp"
 
 namespace wheelwright::app {
 namespace check_command {

@@ -10,14 +10,18 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
+#include "app/report_pages.hpp"
 #include "commission/choice/detector_choice.hpp"
 #include "core/error.hpp"
+#include "formats/logs/recorded_log.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "results/detection_json.hpp"
+#include "results/choice_json.hpp"
 #include "results/model_file.hpp"
 #include "results/report/choice_report.hpp"
-#include "results/words/summary.hpp"
+#include "results/software.hpp"
+#include "results/words/choice_summary.hpp"
 
 namespace wheelwright::app {
 namespace choose_command {
@@ -86,7 +90,7 @@ int run(const Arguments& a) {
     CommonOptions files = a.common;
     files.json = false;
     if (choice.chosen) {
-      report::ReportContext context = report_context(a.common, log.report(), log);
+      report::CommissionContext context{report_context(a.common, log.report(), log)};
       context.seen = commission::first_look(log, choice.chosen->model, options.trial.threads);
       files::write_json(gathered(a.common) / "choice.json", json);
       publish(files, results::to_json(*choice.chosen, log.report(), results::software()), "model.json",

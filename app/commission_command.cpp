@@ -10,18 +10,20 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
+#include "app/report_pages.hpp"
 #include "app/sound_log.hpp"
 #include "commission/commission.hpp"
 #include "commission/two_walks.hpp"
 #include "commission/watch/detector_walk.hpp"
-#include "formats/files/bytes.hpp"
+#include "detector/online_model.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "results/detection_json.hpp"
 #include "results/model_file.hpp"
 #include "results/report/commission_report.hpp"
 #include "results/report/page.hpp"
-#include "results/words/summary.hpp"
+#include "results/software.hpp"
+#include "results/words/commission_summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;
@@ -57,7 +59,7 @@ int run(const Arguments& a) {
   const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::judged);
   logs::RecordedLog& log = *opened.log;
   robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
-  report::ReportContext context = report_context(a.common, log.report(), log);
+  report::CommissionContext context{report_context(a.common, log.report(), log)};
   std::ranges::copy(opened.remarks, std::back_inserter(context.warnings));
   Progress progress(a.common.quiet);
   commission::CommissionOptions options;

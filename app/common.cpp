@@ -22,10 +22,6 @@
 #include "formats/files/bytes.hpp"
 #include "formats/files/words.hpp"
 #include "formats/logs/bag_files.hpp"
-#include "formats/logs/csv.hpp"
-#include "formats/logs/recorded_log.hpp"
-#include "model/robot.hpp"
-#include "results/report/signals.hpp"
 
 namespace wheelwright::app {
 
@@ -94,38 +90,6 @@ int finished(int code) {
   tell("wheelwright: standard output: cannot be written ({}): what stands there is not whole; expected room there\n",
        std::strerror(error));
   return kBadInput;
-}
-
-logs::LogOptions reader_options(const CommonOptions& options) {
-  logs::LogOptions reader;
-  reader.msg_path = options.msg_path;
-  reader.trust = options.trust;
-  reader.map = options.columns;
-  for (const std::string& entry : options.map) {
-    const std::size_t at = entry.find('=');
-    if (at == std::string::npos || at == 0 || at + 1 == entry.size()) {
-      throw InputError("--map '" + entry + "': expected NAME=COLUMN, e.g. --map omega_r=wheel_2");
-    }
-    const std::string name = entry.substr(0, at);
-    if (logs::find_log_column(name) == nullptr) {
-      const std::vector<std::string> names = logs::log_column_names();
-      throw InputError("--map '" + entry + "': " + files::shown(name) + " is no column of a log: expected one of " +
-                       core::listed(names) + files::did_you_mean(name, names));
-    }
-    reader.map[name] = entry.substr(at + 1);
-  }
-  return reader;
-}
-
-logs::LogOptions robot_reader(const Robot& robot, const CommonOptions& options) {
-  logs::LogOptions reader = reader_options(options);
-  reader.only = robots::useful_columns(robot);
-  return reader;
-}
-
-std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
-                                                  const CommonOptions& options) {
-  return logs::open_log(paths, robot_reader(robot, options));
 }
 
 namespace {
@@ -252,11 +216,6 @@ void leave_standard_output(const CommonOptions& options, const std::filesystem::
     throw InputError(out.string() + ": is the standard output, where --json prints: expected one of them");
   }
   standard_output_is_taken() = true;
-}
-
-std::unique_ptr<logs::LogWriter> create_output(const std::filesystem::path& out, const std::vector<std::string>& names,
-                                               const logs::LogWriteOptions& options) {
-  return is_stream(out) && !out.has_extension() ? logs::create_csv(out, names) : logs::create_log(out, names, options);
 }
 
 namespace {
@@ -492,27 +451,6 @@ void publish(const CommonOptions& options, const Json& result, const std::string
   if (options.json) {
     say_json(result);
   }
-}
-
-void print_log(const std::vector<std::string>& sentences) {
-  for (const std::string& sentence : sentences) {
-    say("log: {}\n", sentence);
-  }
-}
-
-report::ReportContext report_context(const CommonOptions& options, const logs::LogReport& data, LogSource& log) {
-  report::ReportContext context;
-  for (const logs::LogFileReport& file : data.files) {
-    context.log_files.push_back(file.path);
-  }
-  context.software = results::software();
-  context.command_line = options.command_line;
-  context.warnings = logs::sentences(data);
-  if (!options.out.empty()) {
-    context.signals = report::raw_signals(log);
-    context.rows = data.rows;
-  }
-  return context;
 }
 
 namespace {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Parts that all commands share: exit codes, output directory, progress on standard error, a report where a step
-/// fails.
+/// Parts that all commands share: exit codes, common options, output directory, progress on standard error.
 #pragma once
 
 #include <chrono>
@@ -20,16 +19,10 @@
 
 #include "app/commands.hpp"
 #include "core/error.hpp"
-#include "detector/detector.hpp"
-#include "formats/files/bytes.hpp"
 #include "formats/files/json.hpp"
 #include "formats/files/temporary.hpp"
 #include "formats/files/words.hpp"
-#include "formats/logs/log_file.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "results/report/commission_report.hpp"
-#include "results/report/page.hpp"
-#include "results/software.hpp"
 
 namespace wheelwright::app {
 
@@ -110,16 +103,6 @@ void say_line(std::string_view line);
 /// take all of the result.
 [[nodiscard]] int finished(int code);
 
-/// --map as reader options. Throws InputError where an entry is not name=column, or its name none of the log contract.
-[[nodiscard]] logs::LogOptions reader_options(const CommonOptions& options);
-
-/// reader_options() for the columns that `robot` can use.
-[[nodiscard]] logs::LogOptions robot_reader(const Robot& robot, const CommonOptions& options);
-
-/// The log in `paths`, with the columns that `robot` can use. Throws InputError as open_log does.
-[[nodiscard]] std::unique_ptr<logs::RecordedLog> open_robot_log(const std::vector<std::filesystem::path>& paths,
-                                                                const Robot& robot, const CommonOptions& options);
-
 /// Throws InputError where a file `out` is there already, unless --force is given or the file begins (its first KiB)
 /// with a text that holds `mark`, which what the command itself writes there has. Pipes and devices are written to.
 void keep_existing(const CommonOptions& options, const std::filesystem::path& out, std::string_view mark = {});
@@ -134,10 +117,6 @@ void keep_inputs(const CommonOptions& options, const std::vector<std::string>& f
 
 /// Whether `out` is no file but a stream, which is written to as it is: a pipe, a device, /dev/stdout.
 [[nodiscard]] bool is_stream(const std::filesystem::path& out);
-/// logs::create_log(); a stream whose name has no ending takes CSV.
-[[nodiscard]] std::unique_ptr<logs::LogWriter> create_output(const std::filesystem::path& out,
-                                                             const std::vector<std::string>& names,
-                                                             const logs::LogWriteOptions& options);
 
 /// Makes the result directory `out` where it is wanted. Throws InputError when that is impossible, where a result would
 /// replace what the command line names to be read, and, unless --force is given, where something else would be replaced
@@ -168,25 +147,6 @@ void discard_gathered();
 /// what was gathered(), in place of all that make_directory() found of an earlier run; all of it or nothing. Writes the
 /// result to standard output with --json.
 void publish(const CommonOptions& options, const Json& result, const std::string& name, const std::string& report);
-
-/// Prints what reading a log found (sentences(LogReport)), a line each, on standard output.
-void print_log(const std::vector<std::string>& sentences);
-
-/// The context of a report: files, repairs, software, command line, raw signals of `log` (which is walked once).
-[[nodiscard]] report::ReportContext report_context(const CommonOptions& options, const logs::LogReport& data,
-                                                   LogSource& log);
-
-/// Runs `work` and returns what it returns. Where it throws an Error and results are wanted, write_failure_page() shows
-/// the message and the raw signals of `context`; the error is thrown on.
-template <typename Work>
-auto or_failure_page(const CommonOptions& options, const report::ReportContext& context, const Work& work) {
-  try {
-    return work();
-  } catch (const Error& error) {
-    write_failure_page(options, report::failure_report(error.what(), context));
-    throw;
-  }
-}
 
 /// "  40 %  identifying (12 s, about 18 s left)": `seconds` have passed at the share [0, 1] of the work. What is left
 /// is told from a twentieth of the work and 2 s on: seconds·(1 − share)/share.

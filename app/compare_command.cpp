@@ -13,6 +13,7 @@
 #include "formats/robots/online_model_file.hpp"
 #include "results/comparison_json.hpp"
 #include "results/report/comparison_report.hpp"
+#include "results/software.hpp"
 #include "results/words/comparison_words.hpp"
 
 namespace wheelwright::app {

@@ -8,6 +8,7 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
 #include "core/error.hpp"
 #include "formats/logs/log_file.hpp"

@@ -17,6 +17,7 @@
 #include "commission/design/stages.hpp"
 #include "formats/files/words.hpp"
 #include "formats/logs/csv.hpp"
+#include "formats/robots/online_model_file.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "gap/effects/effect.hpp"
 #include "gap/next/discrimination_design.hpp"
@@ -24,9 +25,9 @@
 #include "gap/next/named_rivals.hpp"
 #include "results/design_json.hpp"
 #include "results/gap_json.hpp"
-#include "results/model_file.hpp"
 #include "results/report/design_report.hpp"
-#include "results/words/summary.hpp"
+#include "results/software.hpp"
+#include "results/words/design_summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -8,12 +8,16 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
+#include "app/report_pages.hpp"
 #include "commission/doctor/log_health.hpp"
+#include "formats/logs/log_file.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "results/health_json.hpp"
 #include "results/report/health_report.hpp"
-#include "results/words/summary.hpp"
+#include "results/software.hpp"
+#include "results/words/health_summary.hpp"
 
 namespace wheelwright::app {
 namespace doctor_command {

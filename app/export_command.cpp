@@ -10,9 +10,11 @@
 #include "app/options.hpp"
 #include "commission/watch/risk_watch.hpp"
 #include "detector/export/export_c.hpp"
+#include "detector/online_model.hpp"
 #include "formats/files/bytes.hpp"
-#include "results/model_file.hpp"
-#include "results/model_json.hpp"
+#include "formats/robots/online_model_file.hpp"
+#include "results/assumptions_json.hpp"
+#include "results/software.hpp"
 
 namespace wheelwright::app {
 namespace export_command {

@@ -16,6 +16,7 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
 #include "app/run_items.hpp"
 #include "formats/files/bytes.hpp"
@@ -25,7 +26,8 @@
 #include "results/fleet_json.hpp"
 #include "results/fleet_logs.hpp"
 #include "results/report/fleet_report.hpp"
-#include "results/words/summary.hpp"
+#include "results/software.hpp"
+#include "results/words/fleet_summary.hpp"
 #include "study/examine_robot.hpp"
 #include "study/fleet_result.hpp"
 

@@ -25,13 +25,17 @@
 #include "commission/watch/blind_watch.hpp"
 #include "commission/watch/incident_watch.hpp"
 #include "commission/watch/risk_watch.hpp"
+#include "detector/multiscale/pose_sums.hpp"
+#include "detector/multiscale/scale_detector.hpp"
+#include "detector/online_model.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/files/temporary.hpp"
 #include "formats/files/words.hpp"
 #include "formats/logs/csv.hpp"
 #include "results/detection_json.hpp"
+#include "results/software.hpp"
+#include "results/words/detect_summary.hpp"
 #include "results/words/detect_words.hpp"
-#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

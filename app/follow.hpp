@@ -6,7 +6,8 @@
 #include <filesystem>
 
 #include "app/common.hpp"
-#include "commission/commission.hpp"
+#include "detector/detector.hpp"
+#include "detector/learnt_model.hpp"
 #include "formats/logs/csv_format.hpp"
 
 namespace wheelwright::app {

@@ -11,7 +11,9 @@
 #include "app/commands.hpp"
 #include "app/common.hpp"
 #include "app/drive_files.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
+#include "app/report_pages.hpp"
 #include "app/sound_log.hpp"
 #include "core/for_all.hpp"
 #include "formats/files/bytes.hpp"
@@ -22,14 +24,14 @@
 #include "gap/causes/selection.hpp"
 #include "gap/diagnose.hpp"
 #include "gap/effects/effect.hpp"
-#include "gap/next/further_drive.hpp"
+#include "gap/next_drive.hpp"
 #include "gap/prepared.hpp"
 #include "gap/write_back.hpp"
 #include "results/gap_json.hpp"
-#include "results/report/commission_report.hpp"
 #include "results/report/gap_report.hpp"
+#include "results/software.hpp"
+#include "results/words/gap_summary.hpp"
 #include "results/words/gap_words.hpp"
-#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -9,15 +9,18 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
+#include "app/report_pages.hpp"
 #include "app/sound_log.hpp"
 #include "core/error.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "identify/inference/identification.hpp"
 #include "results/identification_json.hpp"
 #include "results/report/identify_report.hpp"
+#include "results/software.hpp"
+#include "results/words/identification_summary.hpp"
 #include "results/words/identification_words.hpp"
-#include "results/words/summary.hpp"
 
 namespace wheelwright::app {
 using namespace words;

@@ -25,6 +25,7 @@
 #include "app/options.hpp"
 #include "core/error.hpp"
 #include "formats/files/temporary.hpp"
+#include "results/software.hpp"
 
 namespace {
 

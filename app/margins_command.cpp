@@ -10,11 +10,15 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
+#include "app/report_pages.hpp"
 #include "commission/margin_survey.hpp"
-#include "results/detection_json.hpp"
-#include "results/model_file.hpp"
+#include "formats/logs/recorded_log.hpp"
+#include "formats/robots/online_model_file.hpp"
+#include "results/margins_json.hpp"
 #include "results/report/detect_report.hpp"
+#include "results/software.hpp"
 #include "results/words/detect_words.hpp"
 #include "results/words/text.hpp"
 

@@ -11,9 +11,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "app/run_items.hpp"
 #include "app/units.hpp"
 #include "core/error.hpp"
 #include "formats/files/words.hpp"
+#include "formats/logs/recorded_log.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -9,8 +9,7 @@
 
 #include "app/command_tree.hpp"
 #include "app/common.hpp"
-#include "app/run_items.hpp"
-#include "detector/detector.hpp"
+#include "detector/detector_options.hpp"
 
 namespace CLI {
 class App;
@@ -19,6 +18,8 @@ class Validator;
 }  // namespace CLI
 
 namespace wheelwright::app {
+
+struct ScaleOptions;
 
 /// Adds the common options to `command`.
 void add_common(CLI::App& command, CommonOptions& options);

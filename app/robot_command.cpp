@@ -14,6 +14,7 @@
 #include "formats/robots/robot_description.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "formats/robots/robot_origin.hpp"
+#include "results/software.hpp"
 
 namespace wheelwright::app {
 namespace robot_command {

@@ -18,8 +18,11 @@
 
 #include <fmt/format.h>
 
+#include "app/common.hpp"
+#include "core/error.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/files/words.hpp"
+#include "results/software.hpp"
 
 namespace wheelwright::app {
 

@@ -11,11 +11,13 @@
 #include <string>
 #include <string_view>
 
-#include "app/common.hpp"
+#include "formats/files/temporary.hpp"
 #include "results/result_store.hpp"
 #include "study/work.hpp"
 
 namespace wheelwright::app {
+
+struct CommonOptions;
 
 /// Distribution of the items of a command.
 struct ScaleOptions {

@@ -8,13 +8,15 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
 #include "app/run_items.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "results/report/sensitivity_report.hpp"
+#include "results/software.hpp"
 #include "results/study_json.hpp"
-#include "results/words/summary.hpp"
+#include "results/words/study_summary.hpp"
 #include "study/study_work.hpp"
 
 namespace wheelwright::app {

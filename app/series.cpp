@@ -10,9 +10,11 @@
 #include <nlohmann/json.hpp>
 
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "commission/physical.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/limits.hpp"
+#include "detector/online_model.hpp"
 #include "formats/files/json.hpp"
 #include "formats/logs/log_file.hpp"
 #include "results/words/text.hpp"

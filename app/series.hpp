@@ -9,7 +9,8 @@
 
 #include "core/interval.hpp"
 #include "core/log.hpp"
-#include "detector/online_model.hpp"
+#include "detector/detector_options.hpp"
+#include "detector/learnt_model.hpp"
 
 namespace wheelwright::app {
 

@@ -14,6 +14,7 @@
 #include "app/options.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/files/words.hpp"
+#include "results/software.hpp"
 
 namespace wheelwright::app {
 namespace {

@@ -12,6 +12,7 @@
 #include "formats/logs/log_file.hpp"
 #include "model/sim/simulation.hpp"
 #include "results/scenario_file.hpp"
+#include "results/software.hpp"
 
 namespace wheelwright::app {
 namespace simulate_command {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/sound_log.hpp"
 
+#include "app/common.hpp"
+#include "app/log_files.hpp"
+
 namespace wheelwright::app {
 
 SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,

@@ -6,11 +6,12 @@
 #include <filesystem>
 #include <vector>
 
-#include "app/common.hpp"
 #include "model/robot.hpp"
-#include "results/fleet_logs.hpp"
+#include "results/sound_log.hpp"
 
 namespace wheelwright::app {
+
+struct CommonOptions;
 
 using results::kExaminedRows;
 using results::SoundLog;

@@ -17,6 +17,7 @@
 
 #include "app/commands.hpp"
 #include "app/common.hpp"
+#include "app/log_files.hpp"
 #include "app/options.hpp"
 #include "app/sound_log.hpp"
 #include "commission/doctor/log_health.hpp"
@@ -29,7 +30,9 @@
 #include "formats/robots/robot_origin.hpp"
 #include "identify/inference/kinematic_calibration.hpp"
 #include "model/model.hpp"
-#include "results/words/summary.hpp"
+#include "results/report/page.hpp"
+#include "results/software.hpp"
+#include "results/words/commission_summary.hpp"
 
 namespace wheelwright::app {
 namespace try_command {

@@ -21,6 +21,12 @@
 
 namespace wheelwright::bounds {
 
+/// One certified bound of a parameter over a set, and the rows that set it.
+struct CertifiedBound {
+  double value = 0.0;                ///< never inside the exact bound
+  std::vector<WeightedRow> binding;  ///< at most p rows (sides of the prior box among them) whose multipliers prove it
+};
+
 /// λ >= 0 with Aᵀλ = a as nearly as 113 bits allow, for p half-spaces that meet in a vertex: nearly collinear columns
 /// make λ large, and its last place as a double is then worth more than the width of the set. `split`: every multiplier
 /// as two rows, the double below it and the rest; else rounded to nearest. Negative multipliers are left out. `basis`

@@ -13,12 +13,6 @@
 
 namespace wheelwright::bounds {
 
-/// One certified bound of a parameter over a set, and the rows that set it.
-struct CertifiedBound {
-  double value = 0.0;                ///< never inside the exact bound
-  std::vector<WeightedRow> binding;  ///< at most p rows (sides of the prior box among them) whose multipliers prove it
-};
-
 /// { θ in box : a·θ <= b for every half-space offered }, held by the few half-spaces that matter.
 ///
 /// Half-spaces may be offered in any order and portions. One that does not cut the set held so far (by more than 1e-10

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "bounds/cutting_planes.hpp"
+#include "bounds/certificate.hpp"
 #include "bounds/slab_rows.hpp"
 #include "core/regression.hpp"
 

@@ -12,6 +12,8 @@
 #include <Eigen/Core>
 
 #include "bounds/certificate.hpp"
+#include "bounds/cutting_planes.hpp"
+#include "bounds/linear_program.hpp"
 #include "bounds/slab_rows.hpp"
 #include "core/interval.hpp"
 #include "core/limits.hpp"

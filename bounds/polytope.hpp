@@ -11,7 +11,6 @@
 
 #include "bounds/box.hpp"
 #include "bounds/certificate.hpp"
-#include "bounds/cutting_planes.hpp"
 
 namespace wheelwright::bounds {
 

@@ -10,11 +10,16 @@
 #include <fmt/format.h>
 
 #include "bounds/feasible_set.hpp"
+#include "bounds/minimax.hpp"
+#include "commission/assumptions.hpp"
 #include "commission/at_risk/at_risk.hpp"
 #include "commission/at_risk/pose_at_risk.hpp"
 #include "commission/contradictions.hpp"
+#include "commission/evidence.hpp"
 #include "commission/fit.hpp"
+#include "commission/noise_budget.hpp"
 #include "commission/setting.hpp"
+#include "commission/setting_rows.hpp"
 #include "commission/two_walks.hpp"
 #include "core/check.hpp"
 #include "model/filter/row_stream.hpp"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "commission/contradictions.hpp"
+#include "commission/setting.hpp"
 #include "core/log.hpp"
 #include "core/statistics.hpp"
 

@@ -9,11 +9,16 @@
 
 #include "commission/commission.hpp"
 #include "commission/contradiction_search.hpp"
+#include "commission/evidence.hpp"
+#include "commission/fit.hpp"
 #include "commission/physical.hpp"
+#include "commission/setting.hpp"
+#include "commission/setting_rows.hpp"
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
 #include "identify/noise_level.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 

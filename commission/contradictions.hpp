@@ -7,49 +7,20 @@
 #include <cstddef>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "commission/evidence.hpp"
-#include "commission/fit.hpp"
-#include "commission/setting.hpp"
+#include "bounds/box.hpp"
+#include "commission/contradiction.hpp"
 #include "core/interval.hpp"
 #include "core/log.hpp"
+#include "model/filter/noise.hpp"
 
 namespace wheelwright::commission {
 
-/// One contradiction.
-struct LogContradiction {
-  /// What contradicts what.
-  enum class Kind {
-    effort_constant,   ///< an effort has one value in every row although its joint moves
-    angle_wrapped,     ///< an angle jumps by a whole turn between two rows
-    stamps_scatter,    ///< the motion is smoother over row numbers than over the stamps: these scatter, the samples do
-                       ///< not
-    effort_unrelated,  ///< an effort that motion does not explain at all
-    effort_timing,     ///< efforts late or early against the motion, beyond what is declared
-    wheels_disagree,   ///< the efforts of two joints do not show one and the same mass
-    wrong_sign,        ///< a quantity that cannot be negative is, significantly
-    dry_friction,      ///< the efforts follow the sign of the motion, and the model has no dry friction
-    prior_edge,        ///< the prior explains the log only with far larger noise
-    estimate_outside,  ///< the estimate lies outside the set, with its whole interval
-    halves_disagree,   ///< the two halves of the log give different robots
-    held_out_outside,  ///< driving that was held out leaves the thresholds
-  };
-  Kind kind = Kind::effort_constant;
-  bool withdraws = true;   ///< no model is published; false: a note beside a model
-  bool demotes = false;    ///< chance does not explain it, worst-case noise would: nothing is called guaranteed
-  std::string subject{};   ///< the parameter, column or output that it is about
-  double value = 0.0;      ///< what was found: s, share, factor, or the parameter's unit
-  double limit = 0.0;      ///< what it was compared with, same unit
-  std::string sentence{};  ///< what was found, with its numbers
-  std::string next{};      ///< what to do about it
-};
-
-/// Name for files: "effort_constant" and so on.
-[[nodiscard]] std::string_view to_string(LogContradiction::Kind kind);
-
 struct Commissioning;
+struct Explained;
+struct Fit;
+struct Setting;
 
 /// A constant shift in time between effort and motion, by least squares over filtered rows (TimeShiftedRows).
 struct EffortTiming {

@@ -6,9 +6,16 @@
 #include <Eigen/QR>
 
 #include "commission/contradiction_search.hpp"
+#include "commission/evidence.hpp"
+#include "commission/fit.hpp"
+#include "commission/setting.hpp"
+#include "commission/setting_rows.hpp"
 #include "core/error.hpp"
+#include "identify/least_squares.hpp"
+#include "identify/moments.hpp"
 #include "identify/time_shift.hpp"
 #include "identify/variable_projection.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 

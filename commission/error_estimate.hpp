@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "core/log.hpp"
-#include "detector/online_model.hpp"
+#include "detector/learnt_model.hpp"
 #include "model/filter/error_class.hpp"
 
 namespace wheelwright::commission {

@@ -5,8 +5,10 @@
 #include <vector>
 
 #include "commission/noise_budget.hpp"
+#include "commission/setting_rows.hpp"
 #include "core/linear_algebra.hpp"
 #include "model/filter/noise.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -7,10 +7,13 @@
 
 #include <fmt/format.h>
 
+#include "bounds/polytope.hpp"
+#include "commission/setting_rows.hpp"
 #include "core/error.hpp"
 #include "core/statistics.hpp"
 #include "identify/instruments.hpp"
 #include "identify/noise_level.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 namespace {

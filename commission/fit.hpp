@@ -7,11 +7,14 @@
 
 #include <Eigen/Core>
 
-#include "bounds/polytope.hpp"
 #include "commission/setting.hpp"
 #include "commission/validation.hpp"
 #include "identify/estimate.hpp"
 #include "identify/least_squares.hpp"
+
+namespace wheelwright::bounds {
+class Polytope;
+}  // namespace wheelwright::bounds
 
 namespace wheelwright::commission {
 
@@ -44,6 +47,6 @@ struct Fit {
 /// `estimate`, with the Chebyshev centre's value for each parameter that the log does not show.
 [[nodiscard]] Eigen::VectorXd best_guess(Eigen::VectorXd estimate,
                                          const std::vector<identify::ExcitationFinding>& excitation,
-                                         const Polytope& set);
+                                         const bounds::Polytope& set);
 
 }  // namespace wheelwright::commission

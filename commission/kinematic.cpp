@@ -12,10 +12,13 @@
 #include "commission/fit.hpp"
 #include "commission/noise_budget.hpp"
 #include "commission/pose_origin.hpp"
+#include "commission/setting_rows.hpp"
 #include "core/check.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
+#include "detector/threshold.hpp"
 #include "identify/least_squares.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -11,13 +11,13 @@
 #include <Eigen/Core>
 
 #include "bounds/feasible_set.hpp"
-#include "commission/noise_budget.hpp"
+#include "commission/output_noise.hpp"
 #include "commission/survey.hpp"
 #include "commission/validation.hpp"
 #include "core/log.hpp"
-#include "detector/online_model.hpp"
+#include "detector/learnt_model.hpp"
 #include "identify/least_squares.hpp"
-#include "model/filter/row_stream.hpp"
+#include "model/filter/odometry_measurement.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::commission {

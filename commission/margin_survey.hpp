@@ -9,10 +9,11 @@
 #include <string_view>
 #include <vector>
 
-#include "commission/commission.hpp"
 #include "core/log.hpp"
+#include "core/warrant.hpp"
+#include "detector/detector_options.hpp"
 #include "detector/faults/margins.hpp"
-#include "detector/multiscale/sum_margins.hpp"
+#include "detector/learnt_model.hpp"
 
 namespace wheelwright::commission {
 

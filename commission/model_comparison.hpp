@@ -22,7 +22,7 @@
 #include "bounds/slab_rows.hpp"
 #include "core/interval.hpp"
 #include "core/warrant.hpp"
-#include "detector/online_model.hpp"
+#include "detector/learnt_model.hpp"
 
 namespace wheelwright::commission {
 

@@ -11,6 +11,7 @@
 
 #include "bounds/box.hpp"
 #include "bounds/minimax.hpp"
+#include "commission/output_noise.hpp"
 #include "core/regression.hpp"
 #include "core/warrant.hpp"
 #include "identify/least_squares.hpp"
@@ -22,16 +23,6 @@
 #include "model/robot.hpp"
 
 namespace wheelwright::commission {
-
-/// The bound on what y − Yθ (for the torque residual τ_f − Y_f θ) can be without a fault, in one output.
-struct OutputNoise {
-  core::NoiseOrigin origin = core::NoiseOrigin::estimated;
-  double bound = 0.0;     ///< for driving to come: n̄ with ē, what a detector's rows have as dy
-  double learning = 0.0;  ///< for the rows of this log, from which the feasible set is made; what was seen needs
-                          ///< no extrapolation, so it is the smaller of the two
-  identify::ExtrapolatedBound how;                      ///< how `bound` came about, meaningful where estimated
-  core::Warrant warrant = core::Warrant::extrapolated;  ///< of both bounds
-};
 
 /// Use of rows: those of the log that bounds are learnt from, or those of later driving.
 enum class RowUse { learning, driving };

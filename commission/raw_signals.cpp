@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "commission/contradiction_search.hpp"
+#include "commission/setting.hpp"
 #include "core/limits.hpp"
 
 namespace wheelwright::commission {

@@ -8,10 +8,12 @@
 
 #include "commission/noise_budget.hpp"
 #include "commission/physical.hpp"
+#include "commission/setting_rows.hpp"
 #include "core/check.hpp"
 #include "identify/instruments.hpp"
 #include "identify/noise_level.hpp"
 #include "model/effect_law.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -18,7 +18,6 @@
 #include "identify/estimate.hpp"
 #include "model/filter/measurement.hpp"
 #include "model/filter/noise.hpp"
-#include "model/filter/row_stream.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::commission {
@@ -62,9 +61,6 @@ struct SettingOptions {
 /// Looks at `log` (several walks) and settles all of it. Throws InputError or InvalidArgument for a log or robot that
 /// cannot be used at all.
 [[nodiscard]] Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options = {});
-
-/// The rows of `log` in this setting, with the error bounds `errors`.
-[[nodiscard]] TorqueRows make_rows(LogSource& log, const Setting& setting, const filter::SignalErrors& errors = {});
 
 /// Contribution of the noise of the motion (at its limit, where only that is known) to the rows' moments
 /// (estimate.hpp), and the efforts' variance for total least squares where their noise is declared; nothing where it is

@@ -6,7 +6,10 @@
 #include <limits>
 
 #include "core/check.hpp"
+#include "core/interval.hpp"
 #include "core/statistics.hpp"
+#include "detector/detector_options.hpp"
+#include "detector/threshold.hpp"
 
 namespace wheelwright::commission {
 

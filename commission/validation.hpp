@@ -9,7 +9,10 @@
 
 #include "core/regression.hpp"
 #include "core/warrant.hpp"
-#include "detector/threshold.hpp"
+
+namespace wheelwright::detector {
+class ThresholdRule;
+}  // namespace wheelwright::detector
 
 namespace wheelwright::commission {
 

@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -13,7 +12,7 @@
 #include <Eigen/Core>
 
 #include "core/check.hpp"
-#include "detector/events.hpp"
+#include "detector/detector_options.hpp"
 #include "detector/threshold.hpp"
 #include "model/filter/row_stream.hpp"
 
@@ -30,22 +29,6 @@ inline double dead_zone(double residual, double threshold) noexcept {
 inline double dead_zone(double residual, double lower, double upper) noexcept {
   return residual < lower || residual > upper ? std::abs(residual) : 0.0;
 }
-
-/// Comparison that decides.
-enum class Test {
-  two_sided,  ///< l <= ε <= u: does not depend on θ̂ and is never less sensitive
-  symmetric,  ///< |ε| <= ρ: the paper's (35)
-};
-
-/// Options of a detector.
-struct DetectorOptions {
-  ParameterSetKind set = ParameterSetKind::polytope;
-  Test test = Test::two_sided;
-  /// k of n; 1 of 1 (or what a commissioned model says) where it is not given, which keeps the certain detections of
-  /// fault_margin.hpp.
-  std::optional<Persistence> persistence{};
-  std::optional<Eigen::VectorXd> mu{};  ///< μ_o of (39), one for each output: constant thresholds instead of ρ(t)
-};
 
 /// One output at one instant.
 struct ChannelDecision {

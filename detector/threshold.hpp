@@ -13,14 +13,9 @@
 #include "bounds/polytope.hpp"
 #include "bounds/support_table.hpp"
 #include "bounds/support_walk.hpp"
+#include "detector/detector_options.hpp"
 
 namespace wheelwright::detector {
-
-/// Outer description of the feasible set from which a threshold is computed.
-enum class ParameterSetKind {
-  box,       ///< the interval hull: closed form, never tighter than the polytope
-  polytope,  ///< the set itself
-};
 
 /// Threshold of one output at one instant, for the residual ε = τ_f − Y_f θ̂ (29).
 struct Threshold {

@@ -14,6 +14,7 @@
 #include <wheelwright/commission/commission.hpp>
 #include <wheelwright/commission/physical.hpp>
 #include <wheelwright/commission/watch/detector_walk.hpp>
+#include <wheelwright/detector/online_model.hpp>
 #include <wheelwright/model/sim/simulation.hpp>
 #include <wheelwright/results/scenario_file.hpp>
 

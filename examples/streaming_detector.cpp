@@ -14,6 +14,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/detector/detector.hpp>
+#include <wheelwright/detector/online_model.hpp>
 #include <wheelwright/model/sim/simulation.hpp>
 #include <wheelwright/results/scenario_file.hpp>
 

@@ -15,6 +15,8 @@
 #include <fmt/format.h>
 
 #include <wheelwright/commission/commission.hpp>
+#include <wheelwright/detector/detector_options.hpp>
+#include <wheelwright/detector/threshold.hpp>
 #include <wheelwright/model/filter/row_stream.hpp>
 #include <wheelwright/model/sim/simulation.hpp>
 #include <wheelwright/results/scenario_file.hpp>

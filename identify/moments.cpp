@@ -7,6 +7,7 @@
 
 #include "core/check.hpp"
 #include "core/linear_algebra.hpp"
+#include "identify/gram_kernels.hpp"
 
 namespace wheelwright::identify {
 

@@ -12,7 +12,10 @@
 #include <Eigen/Core>
 
 #include "core/regression.hpp"
-#include "identify/gram_kernels.hpp"
+
+namespace wheelwright::identify::gram_kernels {
+struct Matrix;
+}  // namespace wheelwright::identify::gram_kernels
 
 namespace wheelwright::identify {
 

@@ -11,11 +11,11 @@
 #include "formats/robots/robot_file.hpp"
 #include "python/arrays.hpp"
 #include "python/module.hpp"
-#include "results/detection_json.hpp"
+#include "results/assumptions_json.hpp"
 #include "results/model_file.hpp"
 #include "results/model_json.hpp"
 #include "results/software.hpp"
-#include "results/words/summary.hpp"
+#include "results/words/commission_summary.hpp"
 
 namespace wheelwright::python {
 

@@ -10,14 +10,17 @@
 
 #include "commission/margin_survey.hpp"
 #include "commission/watch/detector_walk.hpp"
+#include "commission/watch/incident_watch.hpp"
 #include "core/check.hpp"
+#include "detector/online_model.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "python/arrays.hpp"
 #include "python/module.hpp"
 #include "results/detection_json.hpp"
+#include "results/margins_json.hpp"
 #include "results/software.hpp"
+#include "results/words/detect_summary.hpp"
 #include "results/words/detect_words.hpp"
-#include "results/words/summary.hpp"
 
 namespace wheelwright::python {
 namespace {

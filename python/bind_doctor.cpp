@@ -19,13 +19,14 @@
 #include "formats/robots/robot_origin.hpp"
 #include "python/module.hpp"
 #include "results/check_words.hpp"
+#include "results/choice_json.hpp"
 #include "results/comparison_json.hpp"
-#include "results/detection_json.hpp"
 #include "results/health_json.hpp"
 #include "results/model_check.hpp"
 #include "results/software.hpp"
+#include "results/words/choice_summary.hpp"
 #include "results/words/comparison_words.hpp"
-#include "results/words/summary.hpp"
+#include "results/words/health_summary.hpp"
 
 namespace wheelwright::python {
 namespace {

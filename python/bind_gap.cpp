@@ -12,7 +12,7 @@
 #include "formats/robots/robot_file.hpp"
 #include "gap/diagnose.hpp"
 #include "gap/effects/effect.hpp"
-#include "gap/next/further_drive.hpp"
+#include "gap/next_drive.hpp"
 #include "python/arrays.hpp"
 #include "python/module.hpp"
 #include "results/gap_json.hpp"

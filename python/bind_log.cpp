@@ -14,7 +14,9 @@
 #include <nlohmann/json.hpp>
 
 #include "commission/setting.hpp"
+#include "commission/setting_rows.hpp"
 #include "core/check.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/files/words.hpp"
 #include "formats/logs/csv.hpp"
@@ -27,7 +29,7 @@
 #include "python/module.hpp"
 #include "results/identification_json.hpp"
 #include "results/software.hpp"
-#include "results/words/summary.hpp"
+#include "results/words/identification_summary.hpp"
 
 namespace wheelwright::python {
 namespace {

@@ -23,7 +23,7 @@
 #include "results/gap_json.hpp"
 #include "results/scenario_file.hpp"
 #include "results/software.hpp"
-#include "results/words/summary.hpp"
+#include "results/words/design_summary.hpp"
 
 namespace wheelwright::python {
 namespace {

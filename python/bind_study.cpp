@@ -18,7 +18,9 @@
 #include "results/fleet_logs.hpp"
 #include "results/software.hpp"
 #include "results/study_json.hpp"
-#include "results/words/summary.hpp"
+#include "results/words/fleet_summary.hpp"
+#include "results/words/study_summary.hpp"
+#include "study/examine_robot.hpp"
 #include "study/study_work.hpp"
 
 namespace wheelwright::python {

@@ -24,14 +24,18 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "bounds/feasible_set.hpp"
-#include "commission/commission.hpp"
 #include "core/log.hpp"
-#include "detector/detector.hpp"
+#include "detector/detector_options.hpp"
+#include "detector/learnt_model.hpp"
 #include "formats/files/json.hpp"
 #include "formats/logs/log_file.hpp"
 #include "formats/logs/recorded_log.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "model/robot.hpp"
+
+namespace wheelwright::commission {
+struct Commissioning;
+}  // namespace wheelwright::commission
 
 namespace wheelwright::python {
 
@@ -201,7 +205,7 @@ using Rule = std::optional<std::pair<std::size_t, std::size_t>>;
                                                    const Rule& persistence);
 
 /// A Commission of `result`, made of a log with the report `data`.
-[[nodiscard]] py::object commission_object(const Commissioning& result, const logs::LogReport& data);
+[[nodiscard]] py::object commission_object(const commission::Commissioning& result, const logs::LogReport& data);
 
 /// The model.json of a Commission; nothing for another object.
 [[nodiscard]] std::optional<Json> commission_json(const py::handle& object);

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "commission/design/subject.hpp"
 #include "commission/physical.hpp"
 
 namespace wheelwright::results {

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// detection.json: decisions, events and their isolation; margins.json and choice.json: the results of `wheelwright
-/// margins` and `wheelwright choose`.
+/// detection.json: decisions, events and their isolation.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "commission/choice/detector_choice.hpp"
-#include "commission/margin_survey.hpp"
+#include "commission/detection.hpp"
 #include "commission/watch/blind_watch.hpp"
-#include "commission/watch/detector_walk.hpp"
-#include "commission/watch/incident_watch.hpp"
 #include "commission/watch/risk_watch.hpp"
+#include "detector/events.hpp"
+#include "detector/faults/isolation.hpp"
+#include "detector/incidents.hpp"
+#include "detector/learnt_model.hpp"
 #include "formats/files/json.hpp"
 
 namespace wheelwright::results {
@@ -49,24 +49,5 @@ void add_isolation(Json& detection, const std::vector<detector::Isolation>& isol
 [[nodiscard]] Json to_json(const commission::RiskEvent& event, const OnlineModel& model);
 void add_at_risk(Json& json, const commission::RiskWatch& watch, const OnlineModel& model);
 void add_kinematic(Json& detection, const commission::KinematicWatch& watch, const OnlineModel& model);
-
-/// Name of the format: the value of its key `schema`.
-inline constexpr const char* kMarginsSchema = "wheelwright/margins/1";
-
-/// The whole survey as JSON (results/margins.schema.json). `model` and `log` say what it was made of, `software` is
-/// name and version.
-[[nodiscard]] Json to_json(const commission::MarginSurvey& survey, const std::string& model, const std::string& log,
-                           const std::string& software);
-
-/// Name of the format: the value of its key `schema`.
-inline constexpr const char* kChoiceSchema = "wheelwright/choice/1";
-
-/// The whole choice as JSON (results/choice.schema.json). `robot` and `logs` say what it was made of, `software` is
-/// name and version.
-[[nodiscard]] Json to_json(const commission::DetectorChoice& choice, const std::string& robot,
-                           const std::vector<std::string>& logs, const std::string& software);
-
-/// The line of a robot file that asks for this filter.
-[[nodiscard]] std::string robot_file_line(const FilterDesign& filter);
 
 }  // namespace wheelwright::results

@@ -14,6 +14,8 @@
 #include "core/error.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/files/json.hpp"
+#include "gap/next/discrimination.hpp"
+#include "gap/next_drive.hpp"
 #include "gap/where.hpp"
 
 namespace wheelwright::results {

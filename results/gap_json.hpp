@@ -10,8 +10,13 @@
 
 #include "formats/files/json.hpp"
 #include "gap/diagnosis.hpp"
-#include "gap/next/discrimination.hpp"
-#include "gap/next/further_drive.hpp"
+#include "gap/rival.hpp"
+
+namespace wheelwright::gap {
+struct Drive;
+struct NextDrive;
+struct PlannedNoise;
+}  // namespace wheelwright::gap
 
 namespace wheelwright::results {
 

@@ -11,6 +11,7 @@
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
 #include "model/filter/row_stream.hpp"
+#include "results/assumptions_json.hpp"
 #include "results/model_json.hpp"
 #include "results/risk_check.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "core/log.hpp"
 #include "formats/files/json.hpp"
-#include "results/model_file.hpp"
+#include "results/model_claims.hpp"
 #include "results/set_check.hpp"
 
 namespace wheelwright::results {

@@ -14,6 +14,7 @@
 #include "formats/files/json.hpp"
 #include "formats/files/words.hpp"
 #include "formats/robots/robot_file.hpp"
+#include "results/assumptions_json.hpp"
 #include "results/model_file.hpp"
 
 namespace wheelwright::results {

@@ -46,9 +46,6 @@ inline constexpr files::Words<bounds::Side, 2> kSideWords{
 /// Durbin, Wu and Hausman's test (definition endogeneity_test); null where it was not made.
 [[nodiscard]] Json endogeneity_json(const identify::EstimatorChoice& choice);
 
-/// The list as results have it under `assumptions`.
-[[nodiscard]] Json assumptions_json(const std::vector<core::Assumption>& assumptions);
-
 /// What kinematic.at_risk calls the one output of its rows (commission::pose_sum_rows()).
 inline constexpr const char* kPoseSum = "pose";
 

@@ -14,6 +14,7 @@
 #include "commission/noise_budget.hpp"
 #include "commission/physical.hpp"
 #include "core/limits.hpp"
+#include "model/filter/sample_weights.hpp"
 #include "results/model_json.hpp"
 
 namespace wheelwright::results {

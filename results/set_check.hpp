@@ -10,7 +10,7 @@
 
 #include "bounds/check_certificate.hpp"
 #include "core/regression.hpp"
-#include "results/model_file.hpp"
+#include "results/model_claims.hpp"
 
 namespace wheelwright::results {
 

@@ -14,6 +14,7 @@
 #include "core/check.hpp"
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
+#include "model/filter/sample_weights.hpp"
 #include "study/bound_rates.hpp"
 #include "study/study_case.hpp"
 

@@ -26,12 +26,15 @@
 #include <vector>
 
 #include "bounds/polytope.hpp"
-#include "commission/commission.hpp"
 #include "core/log.hpp"
 #include "core/regression.hpp"
 #include "core/warrant.hpp"
 #include "model/filter/measurement.hpp"
 #include "model/robot.hpp"
+
+namespace wheelwright::commission {
+struct Commissioning;
+}  // namespace wheelwright::commission
 
 namespace wheelwright::study {
 
@@ -172,7 +175,7 @@ struct LocalSensitivity {
 /// Derivatives of all bounds of `commissioning`, which was made from `log`. None (see notes) where its set is empty or
 /// a union over open signs. Where noise is estimated, the rows' bounds are held fixed: the estimate's own dependence on
 /// the input is not seen. Throws InvalidArgument, naming what was expected, for an input that is none or has no value.
-[[nodiscard]] LocalSensitivity local_derivatives(LogSource& log, const Commissioning& commissioning,
+[[nodiscard]] LocalSensitivity local_derivatives(LogSource& log, const commission::Commissioning& commissioning,
                                                  const LocalOptions& options = {});
 
 /// Where bounds are not differentiable, one sentence each: input, parameter, reason. None where all are.

@@ -13,6 +13,7 @@
 #include "commission/noise_budget.hpp"
 #include "core/check.hpp"
 #include "core/limits.hpp"
+#include "detector/threshold.hpp"
 #include "model/filter/motion_bound.hpp"
 
 namespace wheelwright::study {

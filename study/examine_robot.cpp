@@ -9,6 +9,7 @@
 
 #include "commission/physical.hpp"
 #include "commission/watch/detector_walk.hpp"
+#include "detector/online_model.hpp"
 
 namespace wheelwright::study {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "core/log.hpp"
 #include "model/robot.hpp"
-#include "model/sim/simulation.hpp"
+#include "model/sim/scenario.hpp"
 
 namespace wheelwright::study {
 

@@ -15,6 +15,7 @@
 #include "core/error.hpp"
 #include "core/limits.hpp"
 #include "core/words.hpp"
+#include "detector/online_model.hpp"
 #include "gap/diagnose.hpp"
 #include "model/fault_type.hpp"
 

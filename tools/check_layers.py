@@ -140,6 +140,7 @@ SKIP = re.compile(r"^(?:\.git|\.cache|build.*|node_modules|out|__pycache__)$")
 # them.
 TYPE = re.compile(r"^(?:(?:struct|class|enum class|enum)\s+(\w+)\b(?!\s*<)[^;]*$|using\s+(\w+)\s*=)", re.M)
 LENT = re.compile(r"(?:(?:using \w+|namespace \w+ = \w+)::\w+;\n)+\}")
+DECLARED = re.compile(r"(?:(?:struct|class) \w+;\n)+\}")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 # Programs that use the installed library, or stand for one.
 USERS = re.compile(r"(?:examples|tests/consumer)/")
@@ -198,11 +199,17 @@ def check_code(module, relative, text, report):
 
 
 def check_space(module, relative, text, report):
-    """Code of a module is in the module's namespace; in wheelwright itself stands what a header lends it."""
+    """Code of a module is in the module's namespace; in wheelwright itself stands what a header lends it, and in that of
+    another module what a header declares of it, where it may include it."""
     space = "wheelwright::" + SPACE.get(module, module)
+    allowed = MAY_INCLUDE.get(module)
     for opened in re.finditer(r"^namespace (wheelwright(?:::\w+)*) \{\n", text, re.M):
-        lent = relative.suffix == ".hpp" and LENT.match(text, opened.end())
-        if not f"{opened.group(1)}::".startswith(f"{space}::") and not (opened.group(1) == "wheelwright" and lent):
+        header = relative.suffix == ".hpp"
+        lent = header and opened.group(1) == "wheelwright" and LENT.match(text, opened.end())
+        other = opened.group(1).split("::")[1:2]
+        declared = (header and other and (allowed is None or other[0] in allowed)
+                    and DECLARED.match(text, opened.end()))
+        if not f"{opened.group(1)}::".startswith(f"{space}::") and not lent and not declared:
             report(relative, text[: opened.start()].count("\n") + 1,
                    f"namespace {opened.group(1)} in {module}: expected {space}")
 
@@ -332,11 +339,12 @@ def self_test():
         "@core/a.hpp": head + "#include <vector>\n// a random comment on rand() and std::cout\nstruct A {\n};\n",
         "@bounds/b.hpp": head + '#include "@core/a.hpp"\nstruct A;\nstruct B {};\nstruct B<2> {};\n',
         "@model/m.hpp": head + "namespace wheelwright::model {\nint f();\n}\n\nnamespace wheelwright {\nusing model::f;\n}\n",
+        "@bounds/d.hpp": head + "namespace wheelwright::core {\nclass C;\nstruct D;\n}\n",
         "@files/c.cpp": spdx + '#include <fstream>\n#include "@core/a.hpp"\n',
-        "@identify/inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
+        "@inference/robust.cpp": spdx + "#include <ceres/ceres.h>\n",
         "@study/work_on_ranks.cpp": spdx + "#include <chrono>\n#include <mpi.h>\n",
         "@detector/CMakeLists.txt": hash_spdx + "wheelwright_room(detector\n  USES core filter\n  LINK x)\n",
-        "@model/filter/CMakeLists.txt": hash_spdx + "wheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",
+        "@filter/CMakeLists.txt": hash_spdx + "wheelwright_room(filter\n  HEADERS a.hpp\n    b.hpp\n  SHARED s.hpp\n  SOURCES c.cpp)\n",
         "@core/wide.cpp": spdx + "// " + "Δ" * (WIDTH - 3) + "\n",
         "docs/wide.md": "x" * 200 + "\n",
         "@detector/shared.cpp": spdx + '#include "@filter/s.hpp"\n',
@@ -352,6 +360,7 @@ def self_test():
         "not installed": ("@filter/a.hpp", head + '#include "@filter/s.hpp"\n'),
         "linked upwards": ("@identify/CMakeLists.txt", hash_spdx + "wheelwright_room(identify\n  USES core bounds)\n"),
         "another module's namespace": ("@bounds/x.cpp", spdx + "namespace wheelwright::core {\n}\n"),
+        "declared upwards": ("@bounds/x.hpp", head + "namespace wheelwright::filter {\nclass C;\n}\n"),
         "no module's namespace": ("@bounds/x.hpp", head + "namespace wheelwright {\nint f();\n}\n"),
         "our header by the installed name": ("@bounds/x.cpp", spdx + "#include <wheelwright/core/a.hpp>\n"),
         "our header by its place in an example": ("examples/x.cpp", spdx + '#include "@core/a.hpp"\n'),

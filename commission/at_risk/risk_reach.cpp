@@ -9,7 +9,10 @@
 
 #include "commission/physical.hpp"
 #include "core/limits.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "detector/multiscale/sum_margins.hpp"
+#include "detector/multiscale/sum_response.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::commission {
 namespace {

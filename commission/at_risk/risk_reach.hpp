@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "detector/multiscale/scale_detector.hpp"
+#include "detector/learnt_model.hpp"
+#include "detector/sum_weight.hpp"
 
 namespace wheelwright::commission {
 

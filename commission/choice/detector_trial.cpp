@@ -13,8 +13,12 @@
 #include "core/error.hpp"
 #include "core/limits.hpp"
 #include "core/statistics.hpp"
+#include "detector/faults/fault_rows.hpp"
 #include "detector/faults/margins.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "detector/multiscale/sum_margins.hpp"
+#include "detector/multiscale/sum_response.hpp"
+#include "model/filter/regressor_filter.hpp"
 
 namespace wheelwright::commission {
 namespace {

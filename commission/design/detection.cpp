@@ -7,10 +7,12 @@
 #include <utility>
 
 #include "commission/design/risk_promise.hpp"
+#include "commission/design/subject.hpp"
 #include "core/check.hpp"
 #include "core/limits.hpp"
 #include "detector/events.hpp"
 #include "detector/faults/fault_margin.hpp"
+#include "detector/learnt_model.hpp"
 
 namespace wheelwright::design {
 

@@ -13,9 +13,15 @@
 #include <optional>
 #include <vector>
 
-#include "commission/commission.hpp"
 #include "commission/design/manoeuvre.hpp"
+#include "core/warrant.hpp"
+#include "detector/events.hpp"
 #include "model/fault_type.hpp"
+
+namespace wheelwright::detector {
+struct OnlineModel;
+class ThresholdRule;
+}  // namespace wheelwright::detector
 
 namespace wheelwright::design {
 
@@ -80,13 +86,13 @@ struct DetectionDesign {
 /// design_manoeuvre() for certain detection of `faults` with the detector of `model` (its errors and its persistence)
 /// under DesignOptions::guarantee, and the best figure eight beside it. Throws InvalidArgument where that is at_risk
 /// and the model says nothing at a risk.
-[[nodiscard]] DetectionDesign design_for_detection(const OnlineModel& model, const DesignSubject& subject,
+[[nodiscard]] DetectionDesign design_for_detection(const detector::OnlineModel& model, const DesignSubject& subject,
                                                    const MotionLimits& limits,
                                                    const std::vector<InspectedFault>& faults,
                                                    const DesignOptions& options = {});
 
 /// Faults that are inspected where none is named: wheel radii by 5 %, efforts lost by 20 %, encoders' scale by 5 %; for
 /// other models what there is of these.
-[[nodiscard]] std::vector<InspectedFault> usual_inspection(const OnlineModel& model);
+[[nodiscard]] std::vector<InspectedFault> usual_inspection(const detector::OnlineModel& model);
 
 }  // namespace wheelwright::design

@@ -8,8 +8,10 @@
 #include <span>
 #include <vector>
 
+#include "commission/at_risk/risk_set.hpp"
 #include "commission/design/risk_promise.hpp"
 #include "commission/design/stages.hpp"
+#include "commission/design/subject.hpp"
 #include "core/check.hpp"
 #include "core/error.hpp"
 

@@ -11,7 +11,7 @@
 #include <string_view>
 
 #include "commission/design/plan.hpp"
-#include "commission/design/subject.hpp"
+#include "core/warrant.hpp"
 
 namespace wheelwright::design {
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bounds/interval_hull.hpp"
+#include "commission/design/subject.hpp"
 #include "core/check.hpp"
 #include "core/linear_algebra.hpp"
 

@@ -31,13 +31,14 @@
 #include <Eigen/Core>
 
 #include "bounds/box.hpp"
-#include "commission/design/subject.hpp"
 #include "core/interval.hpp"
 #include "core/log.hpp"
 #include "core/regression.hpp"
 #include "model/robot.hpp"
 
 namespace wheelwright::design {
+
+struct DesignSubject;
 
 /// Effort of each joint for one instant of a motion: |τ| <= max over θ in the subject's effort box of |B⁺ Y(v, v̇) θ|,
 /// with B the model's input matrix.

@@ -8,6 +8,7 @@
 
 #include "bounds/feasible_set.hpp"
 #include "commission/at_risk/risk_set.hpp"
+#include "commission/design/subject.hpp"
 #include "core/check.hpp"
 #include "core/limits.hpp"
 #include "detector/faults/fault_margin.hpp"

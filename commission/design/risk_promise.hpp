@@ -17,6 +17,8 @@
 
 #include "commission/design/detection.hpp"
 #include "commission/design/plan.hpp"
+#include "commission/design/subject.hpp"
+#include "detector/learnt_model.hpp"
 
 namespace wheelwright::design {
 

@@ -11,10 +11,12 @@
 #include <nlopt.hpp>
 
 #include "commission/design/plan.hpp"
+#include "commission/design/subject.hpp"
 #include "core/check.hpp"
 #include "core/error.hpp"
 #include "core/for_all.hpp"
 #include "core/random.hpp"
+#include "detector/sum_weight.hpp"
 
 namespace wheelwright::design {
 namespace {

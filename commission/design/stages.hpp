@@ -21,7 +21,6 @@
 #include <vector>
 
 #include "commission/design/plan.hpp"
-#include "commission/design/subject.hpp"
 
 namespace wheelwright::design {
 

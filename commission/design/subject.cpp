@@ -16,6 +16,7 @@
 #include "commission/survey.hpp"
 #include "core/check.hpp"
 #include "core/error.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "model/filter/row_stream.hpp"
 
 namespace wheelwright::design {

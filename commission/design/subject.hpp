@@ -8,12 +8,22 @@
 #include <Eigen/Core>
 
 #include "bounds/box.hpp"
-#include "commission/commission.hpp"
+#include "core/log.hpp"
 #include "core/regression.hpp"
 #include "core/warrant.hpp"
-#include "detector/faults/reference_motion.hpp"
+#include "detector/learnt_model.hpp"
 #include "model/filter/error_class.hpp"
+#include "model/filter/measurement.hpp"
+#include "model/filter/noise.hpp"
 #include "model/robot.hpp"
+
+namespace wheelwright::detector {
+struct ReferenceMotion;
+}  // namespace wheelwright::detector
+
+namespace wheelwright::filter {
+class RegressorFilter;
+}  // namespace wheelwright::filter
 
 namespace wheelwright::design {
 
@@ -59,7 +69,7 @@ struct DesignSubject {
 [[nodiscard]] LogTable planned_log(const Plan& plan, const DesignSubject& subject);
 
 /// The filter of a planned log, which knows its steps, with the errors that its sensors will make.
-[[nodiscard]] RegressorFilter planned_filter(LogSource& log, const Plan& plan, const DesignSubject& subject);
+[[nodiscard]] filter::RegressorFilter planned_filter(LogSource& log, const Plan& plan, const DesignSubject& subject);
 
 /// DesignSubject::averaging for the steps of `plan`. Throws InvalidArgument where there is none.
 [[nodiscard]] filter::ErrorClasses planned_classes(const Plan& plan, const DesignSubject& subject);

@@ -8,6 +8,9 @@
 #include <fmt/format.h>
 
 #include "commission/watch/blind_watch.hpp"
+#include "detector/faults/reference_motion.hpp"
+#include "detector/multiscale/sum_response.hpp"
+#include "detector/online_model.hpp"
 
 namespace wheelwright::commission {
 namespace {

@@ -8,8 +8,12 @@
 #include <optional>
 #include <vector>
 
-#include "commission/watch/detector_walk.hpp"
+#include "commission/detection.hpp"
+#include "commission/event_isolation.hpp"
+#include "core/log.hpp"
+#include "detector/events.hpp"
 #include "detector/incidents.hpp"
+#include "detector/learnt_model.hpp"
 
 namespace wheelwright::commission {
 

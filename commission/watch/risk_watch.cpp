@@ -10,6 +10,8 @@
 
 #include "commission/two_walks.hpp"
 #include "core/log.hpp"
+#include "detector/multiscale/pose_sums.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 
 namespace wheelwright::commission {
 

@@ -9,8 +9,14 @@
 #include <vector>
 
 #include "core/log.hpp"
-#include "detector/multiscale/pose_sums.hpp"
-#include "detector/multiscale/scale_detector.hpp"
+#include "detector/learnt_model.hpp"
+#include "detector/sum_weight.hpp"
+
+namespace wheelwright::detector {
+class PoseSumDetector;
+class ScaleDetector;
+struct SumState;
+}  // namespace wheelwright::detector
 
 namespace wheelwright::commission {
 

@@ -19,6 +19,7 @@
 #include "detector/export/export_c_filter.hpp"
 #include "detector/export/export_c_sums.hpp"
 #include "detector/export/export_c_text.hpp"
+#include "detector/online_model.hpp"
 
 namespace wheelwright::exporter {
 namespace {

@@ -9,6 +9,7 @@
 
 #include "bounds/certificate.hpp"
 #include "bounds/linear_program.hpp"
+#include "bounds/polytope.hpp"
 #include "bounds/slab_rows.hpp"
 #include "core/check.hpp"
 #include "core/for_all.hpp"

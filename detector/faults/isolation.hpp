@@ -29,12 +29,20 @@
 #include <optional>
 #include <vector>
 
-#include "bounds/polytope.hpp"
 #include "core/interval.hpp"
-#include "detector/faults/reference_motion.hpp"
 #include "model/fault_type.hpp"
 
+namespace wheelwright::bounds {
+class Polytope;
+}  // namespace wheelwright::bounds
+
+namespace wheelwright::filter {
+class RegressorFilter;
+}  // namespace wheelwright::filter
+
 namespace wheelwright::detector {
+
+struct ReferenceMotion;
 
 /// Options of the isolation.
 struct IsolationOptions {
@@ -86,8 +94,8 @@ struct Isolation {
 /// Tells `faults` apart after an alarm at `alarm` whose first instant outside is `outside` (both times of rows of the
 /// log, s). `motion` is the log's own (read_reference() with `filter`), or a piece of it that begins 16/β and more
 /// before the window; `set` is P. Throws InvalidArgument where `alarm` is not in the motion, or options make no sense.
-[[nodiscard]] Isolation isolate(const ReferenceMotion& motion, const RegressorFilter& filter, const Polytope& set,
-                                const std::vector<FaultType>& faults, double outside, double alarm,
-                                const IsolationOptions& options = {});
+[[nodiscard]] Isolation isolate(const ReferenceMotion& motion, const filter::RegressorFilter& filter,
+                                const bounds::Polytope& set, const std::vector<FaultType>& faults, double outside,
+                                double alarm, const IsolationOptions& options = {});
 
 }  // namespace wheelwright::detector

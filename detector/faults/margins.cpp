@@ -12,6 +12,10 @@
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "detector/events.hpp"
+#include "detector/faults/fault_margin.hpp"
+#include "detector/faults/fault_rows.hpp"
+#include "detector/faults/reference_motion.hpp"
+#include "detector/threshold.hpp"
 
 namespace wheelwright::detector {
 

@@ -14,13 +14,14 @@
 #include <Eigen/Core>
 
 #include "detector/events.hpp"
-#include "detector/faults/fault_margin.hpp"
-#include "detector/faults/fault_rows.hpp"
-#include "detector/faults/reference_motion.hpp"
 #include "model/fault_type.hpp"
 #include "model/filter/noise.hpp"
 
 namespace wheelwright::detector {
+
+class FaultRows;
+struct ReferenceMotion;
+class ThresholdRule;
 
 /// Manoeuvre: the kind of motion over a stretch of time.
 enum class ManoeuvreKind {

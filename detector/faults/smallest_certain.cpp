@@ -7,6 +7,7 @@
 
 #include "core/check.hpp"
 #include "core/for_all.hpp"
+#include "detector/faults/fault_margin.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/limits.hpp"
+#include "detector/faults/fault_margin.hpp"
 #include "detector/faults/margins.hpp"
 #include "detector/multiscale/sum_margins.hpp"
 #include "detector/multiscale/sum_response.hpp"

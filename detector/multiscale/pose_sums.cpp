@@ -9,8 +9,10 @@
 
 #include "core/check.hpp"
 #include "core/limits.hpp"
+#include "detector/detector.hpp"
 #include "detector/multiscale/sum_kernel.hpp"
 #include "model/filter/kernel.hpp"
+#include "model/filter/odometry_filter.hpp"
 
 namespace wheelwright::detector {
 namespace {

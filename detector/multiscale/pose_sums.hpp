@@ -12,29 +12,12 @@
 #include <Eigen/Core>
 
 #include "core/log.hpp"
+#include "detector/learnt_model.hpp"
 #include "detector/multiscale/scale_detector.hpp"
-#include "detector/online_model.hpp"
+#include "detector/sum_weight.hpp"
 #include "detector/threshold.hpp"
 
 namespace wheelwright::detector {
-
-/// What the weights of a sum are like: the shape of what a fault adds to the motion, as it is foreseen.
-struct PoseWeight {
-  /// Shape.
-  enum class Shape {
-    along,     ///< a constant speed along the heading: slip of both wheels
-    across,    ///< a constant speed across it: lateral slip
-    turn,      ///< a constant turning rate: slip of one wheel, a sheared axle
-    radius,    ///< the way that one wheel rolls: its effective radius, or the scale of its encoder
-    yaw_gain,  ///< the turn that one wheel makes: radius over track width
-  };
-  Shape shape = Shape::along;
-  std::size_t wheel = 0;  ///< 0 right, 1 left; of radius and yaw_gain
-  std::string name{};     ///< "slip_along", "slip_across", "turn", "radius_right", "yaw_gain_left"
-
-  /// True if the sum is of positions, in m; else of headings, in rad.
-  [[nodiscard]] bool of_position() const { return shape != Shape::turn && shape != Shape::yaw_gain; }
-};
 
 /// The weights of a model's sums: none without a heading, those of headings alone without a position.
 [[nodiscard]] std::vector<PoseWeight> pose_weights(const filter::OdometryMeasurement& measurement);

@@ -8,8 +8,10 @@
 #include "core/check.hpp"
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
+#include "detector/detector.hpp"
 #include "detector/multiscale/sum_kernel.hpp"
 #include "model/filter/kernel.hpp"
+#include "model/filter/sample_weights.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -12,25 +12,13 @@
 #include <Eigen/Core>
 
 #include "core/log.hpp"
-#include "detector/online_model.hpp"
+#include "detector/learnt_model.hpp"
+#include "detector/sum_weight.hpp"
 #include "detector/threshold.hpp"
 #include "model/filter/element_filter.hpp"
 #include "model/filter/predictable_regressor.hpp"
 
 namespace wheelwright::detector {
-
-/// What the weights of a sum are like: the shape of what a fault adds to the torque, as it is foreseen.
-struct SumWeight {
-  /// Shape.
-  enum class Shape {
-    constant,   ///< of the joint's effort: a bias; a jump of the speed, over short scales
-    effort,     ///< the joint's effort: a share of it is lost
-    parameter,  ///< the torque of one parameter: it has changed
-  };
-  Shape shape = Shape::constant;
-  std::size_t which = 0;  ///< joint or parameter
-  std::string name{};     ///< "effort_right", "constant_left", "mass"
-};
 
 /// The weights of a model's sums: constant and effort of each joint, torque of each parameter.
 [[nodiscard]] std::vector<SumWeight> sum_weights(const Model& model);

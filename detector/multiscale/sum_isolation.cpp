@@ -6,9 +6,13 @@
 #include <optional>
 #include <vector>
 
+#include "bounds/polytope.hpp"
 #include "core/for_all.hpp"
 #include "core/limits.hpp"
 #include "detector/faults/onset_rows.hpp"
+#include "detector/learnt_model.hpp"
+#include "detector/multiscale/sum_response.hpp"
+#include "detector/threshold.hpp"
 
 namespace wheelwright::detector {
 namespace {

@@ -6,9 +6,11 @@
 #include <cstddef>
 
 #include "detector/faults/isolation.hpp"
-#include "detector/multiscale/sum_response.hpp"
 
 namespace wheelwright::detector {
+
+struct OnlineModel;
+struct SumDrive;
 
 /// Options of narrow_by_sums().
 struct SumIsolationOptions {

@@ -10,9 +10,11 @@
 #include <vector>
 
 #include "detector/faults/margins.hpp"
-#include "detector/multiscale/sum_response.hpp"
 
 namespace wheelwright::detector {
+
+struct OnlineModel;
+struct SumDrive;
 
 /// Options of margins_at_risk().
 struct SumMarginOptions {

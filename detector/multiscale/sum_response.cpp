@@ -9,6 +9,7 @@
 #include "core/check.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/regression.hpp"
+#include "model/filter/sample_weights.hpp"
 
 namespace wheelwright::detector {
 namespace {

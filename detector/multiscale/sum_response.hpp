@@ -36,9 +36,9 @@
 #include "core/log.hpp"
 #include "detector/faults/fault_rows.hpp"
 #include "detector/faults/reference_motion.hpp"
+#include "detector/learnt_model.hpp"
 #include "detector/multiscale/scale_detector.hpp"
 #include "detector/multiscale/sum_kernel.hpp"
-#include "detector/online_model.hpp"
 
 namespace wheelwright::detector {
 

@@ -12,6 +12,7 @@
 #include "core/error.hpp"
 #include "detector/multiscale/pose_sums.hpp"
 #include "detector/multiscale/scale_detector.hpp"
+#include "detector/online_model.hpp"
 #include "formats/files/bytes.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "formats/robots/robot_keys.hpp"

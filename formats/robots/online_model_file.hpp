@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "detector/online_model.hpp"
+#include "detector/learnt_model.hpp"
 #include "formats/files/json.hpp"
 
 namespace wheelwright::robots {

@@ -8,9 +8,12 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include "bounds/kernels.hpp"
+#include "commission/design/subject.hpp"
 #include "commission/noise_budget.hpp"
 #include "core/check.hpp"
 #include "core/linear_algebra.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 #include "gap/rows/block_gram.hpp"
 #include "gap/rows/drive.hpp"
 #include "model/filter/noise.hpp"

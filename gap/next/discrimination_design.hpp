@@ -11,6 +11,10 @@
 #include "commission/design/manoeuvre.hpp"
 #include "gap/next/discrimination.hpp"
 
+namespace wheelwright::design {
+struct DesignSubject;
+}  // namespace wheelwright::design
+
 namespace wheelwright::gap {
 
 /// `subject` with torques in place of currents or voltages, as a gap is diagnosed (TorqueView), where the motor's

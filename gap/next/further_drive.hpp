@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Planned drives of a robot whose log was analysed: within what limits, what they would tell, and the one that
-/// discriminates between the causes that the log leaves possible.
+/// Planned drives of a robot whose log was analysed: within what limits, and what they would tell.
 #pragma once
 
 #include <optional>
@@ -12,12 +11,8 @@
 
 #include "commission/design/plan.hpp"
 #include "commission/design/subject.hpp"
-#include "core/log.hpp"
 #include "gap/causes/candidate.hpp"
 #include "gap/causes/confusion.hpp"
-#include "gap/diagnose.hpp"
-#include "gap/diagnosis.hpp"
-#include "gap/next/discrimination_design.hpp"
 #include "gap/prepared.hpp"
 #include "gap/rows/block_gram.hpp"
 #include "gap/rows/drive.hpp"
@@ -48,25 +43,5 @@ namespace wheelwright::gap {
 void judge_pairs(std::vector<ConfusablePair>& pairs, const CandidateTable& table,
                  const std::vector<std::optional<Signature>>& on_log, BaseModel base, const PreparedGap& prepared,
                  const Robot& robot, const BlockOptions& blocks);
-
-/// The next drive to record.
-struct NextDrive {
-  std::vector<Rival> rivals;         ///< members of the credible set as fitted to the log, in its order
-  std::vector<Effect> laws;          ///< that their causes follow, one of each name
-  std::optional<LogTable> commands;  ///< of the wheels; nothing where no drive tells any two of the rivals apart
-  std::string sentence;              ///< what the drive promises, and what no drive can
-};
-
-/// Designs the drive for the credible set of `diagnosis`, the first few members of it: each fitted to the log again, of
-/// the robot and options that diagnosed it. Limits are those of the robot file; where it has none, what the log itself
-/// drove: speeds, accelerations, and with a pose the distance from the start. Four fifths of the effort are planned
-/// with, for the controller to have the rest. It lasts a third of the log, between 20 and 60 s. Where too few members
-/// can be planned for in seconds, having shapes by the hundred, the sentence has the measurement that would split them.
-[[nodiscard]] NextDrive next_drive(LogSource& log, LogSource* baseline, const Robot& robot, const Diagnosis& diagnosis,
-                                   const DiagnoseOptions& options);
-
-/// next_drive() where `diagnosis` is ambiguous; what hinders it, or what no drive can tell, becomes a note of it.
-[[nodiscard]] NextDrive what_next(LogSource& log, LogSource* baseline, const Robot& robot, Diagnosis& diagnosis,
-                                  const DiagnoseOptions& options);
 
 }  // namespace wheelwright::gap

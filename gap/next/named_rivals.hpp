@@ -7,8 +7,17 @@
 #include <string>
 #include <vector>
 
-#include "commission/design/manoeuvre.hpp"
-#include "gap/next/discrimination.hpp"
+#include "gap/effects/effect.hpp"
+#include "gap/rival.hpp"
+#include "gap/rows/drive.hpp"
+
+namespace wheelwright::design {
+struct DesignSubject;
+}  // namespace wheelwright::design
+
+namespace wheelwright::design {
+struct MotionLimits;
+}  // namespace wheelwright::design
 
 namespace wheelwright::gap {
 

@@ -11,12 +11,14 @@
 
 #include "commission/noise_budget.hpp"
 #include "commission/physical.hpp"
+#include "commission/setting_rows.hpp"
 #include "core/check.hpp"
 #include "core/error.hpp"
 #include "core/linear_algebra.hpp"
 #include "identify/inference/constrained.hpp"
 #include "identify/noise_level.hpp"
 #include "identify/time_shift.hpp"
+#include "model/filter/row_stream.hpp"
 
 namespace wheelwright::inference {
 namespace {

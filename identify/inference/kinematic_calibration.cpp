@@ -17,6 +17,7 @@
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
+#include "identify/gram_kernels.hpp"
 #include "identify/moments.hpp"
 #include "identify/noise_level.hpp"
 

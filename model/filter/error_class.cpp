@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/check.hpp"
+#include "model/filter/sample_weights.hpp"
 
 namespace wheelwright::filter {
 

@@ -8,9 +8,10 @@
 #include <cstddef>
 
 #include "core/limits.hpp"
-#include "model/filter/sample_weights.hpp"
 
 namespace wheelwright::filter {
+
+struct SampleWeight;
 
 /// Errors e of one sensor: |e| <= bound always, and whatever happened up to `correlation` (s) before a sample, the mean
 /// of its error is within ±bias, and the root of its mean square about that mean is at most `deviation`. Nothing else

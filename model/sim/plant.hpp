@@ -15,15 +15,9 @@
 #include "model/effect_law.hpp"
 #include "model/faults.hpp"
 #include "model/robot.hpp"
+#include "model/sim/scenario.hpp"
 
 namespace wheelwright::sim {
-
-/// Distribution of the noise inside its bound.
-enum class NoiseShape {
-  uniform,             ///< on [−bound, bound]
-  truncated_gaussian,  ///< standard deviation bound/3 before it is cut at ±bound
-  two_point,           ///< −bound or bound, as a coin decides
-};
 
 /// One stream of noise. Draws are made of mt19937_64 by own transforms, so they do not depend on the standard library.
 class Noise {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Scenarios and their simulation in closed loop, with faults: reference trajectories of the paper and the controller
-/// that follows them.
+/// Simulation of a scenario in closed loop: the reference trajectories of the paper and the controller that follows
+/// them.
 #pragma once
 
 #include <array>
@@ -13,45 +13,14 @@
 
 #include <Eigen/Core>
 
-#include "core/interval.hpp"
 #include "core/log.hpp"
 #include "model/differential_drive.hpp"
-#include "model/faults.hpp"
 #include "model/robot.hpp"
 #include "model/sim/drivetrain.hpp"
 #include "model/sim/plant.hpp"
+#include "model/sim/scenario.hpp"
 
 namespace wheelwright::sim {
-
-/// Speeds over time, linear between the rows; at rest before the first row and after the last one.
-struct SpeedTable {
-  std::vector<double> t;               ///< s, increasing
-  std::vector<Eigen::Vector2d> speed;  ///< [v1, v2] at these times, m/s, rad/s
-};
-
-/// Motion of the reference robot. Speeds start from 0 over one second, and are continuously differentiable; those of a
-/// table are as the table says.
-struct Trajectory {
-  enum class Kind {
-    straight,       ///< v1 = speed·(0.6 + 0.4 sin), no turning
-    circle,         ///< constant speed and yaw rate
-    figure_eight,   ///< constant speed, heading swinging by 2.405 rad (the first zero of J0, so that it closes)
-    multi_sine,     ///< both speeds of three sines, reversals included
-    spin,           ///< turning on the spot, to and fro
-    stops,          ///< drives in curves, and stands still half of the time
-    commissioning,  ///< straight, figure eight, multi-sine, spin, and driving in curves, one period each, with stops
-    table,          ///< the speeds of `table`
-  };
-  Kind kind = Kind::commissioning;
-  double speed = 0.5;     ///< largest |v1|, m/s
-  double yaw_rate = 0.8;  ///< largest |v2|, rad/s; the figure eight's own is 2.405·2π/period
-  double period = 10.0;   ///< s
-  SpeedTable table = {};  ///< of Kind::table
-};
-
-/// Throws InvalidArgument, naming the field, unless speed and yaw rate are >= 0, the period is > 0 and, for
-/// Kind::table, the table has two rows or more of finite numbers with increasing times.
-void validate(const Trajectory& trajectory);
 
 /// Reference speeds at one instant.
 struct ReferenceSpeed {
@@ -66,15 +35,6 @@ struct ReferenceSpeed {
 /// twist at the middle of the step, exact for constant speeds, else with an error of O(h³) a step.
 [[nodiscard]] Eigen::Vector3d advance_reference(const Trajectory& trajectory, const Eigen::Vector3d& pose, double t,
                                                 double h);
-
-/// Gains of the tracking controller.
-struct ControllerGains {
-  double along = 1.0;     ///< of the error along the heading, 1/s
-  double across = 4.0;    ///< of the error across it, rad/m² (times v_d sinc θ_e)
-  double heading = 2.0;   ///< of the heading error, 1/s
-  double speed = 8.0;     ///< of the speed error, 1/s
-  double integral = 8.0;  ///< of its integral, 1/s²
-};
 
 /// Tracks a reference pose. The kinematic law is Samson's (1993, nonlinear form of Kanayama et al. 1990), which also
 /// holds in reverse:
@@ -108,51 +68,6 @@ class TrackingController {
   std::optional<double> torque_limit_;
   Eigen::Vector2d integral_ = Eigen::Vector2d::Zero();
 };
-
-/// Meaning of a row of the log.
-enum class Sampling {
-  instant,   ///< everything at the time stamp: speeds are samples of the speed
-  interval,  ///< a sampling interval, stamped at its middle: speeds are angle differences over it (encoder differences
-             ///< where the encoder is quantised), efforts its mean; angles and pose are those of the stamp
-};
-
-/// Logged signals and their errors. Bounds are |error| <= bound; 0 means exact.
-struct Sensors {
-  Sampling sampling = Sampling::instant;
-  NoiseShape noise = NoiseShape::uniform;
-  double wheel_speed = 0.0;                       ///< bound, rad/s
-  double wheel_angle = 0.0;                       ///< bound before quantisation, rad
-  double effort = 0.0;                            ///< bound, unit of the effort
-  double position = 0.0;                          ///< bound on x and y, m
-  double heading = 0.0;                           ///< bound, rad
-  std::optional<double> encoder_counts_per_turn;  ///< rounds wheel angles to the nearest count
-  bool angles = true;                             ///< columns phi_r, phi_l
-  bool speeds = true;                             ///< columns omega_r, omega_l
-  bool pose = true;                               ///< columns x, y, theta
-  bool commands = true;                           ///< columns command_r, command_l
-};
-
-/// A simulated drive of a differential-drive robot.
-struct Scenario {
-  Robot robot;  ///< geometry, effort (torque, or current with the motor's constants), hold; `nominal` is
-                ///< what the controller believes, where it is given
-  model::DriveParameters parameters;  ///< the truth, physical (ℓ = D/2)
-  Trajectory trajectory;
-  ControllerGains controller;
-  std::optional<double> torque_limit;                            ///< saturation of each wheel, N·m
-  Eigen::Vector3d initial_pose = Eigen::Vector3d::Zero();        ///< of the reference, m, m, rad
-  Eigen::Vector3d initial_pose_error = Eigen::Vector3d::Zero();  ///< robot minus reference, m, m, rad
-  std::vector<model::Fault> faults;
-  Sensors sensors;
-  double duration = 60.0;      ///< s
-  double rate = 100.0;         ///< samples and control periods per second, Hz
-  double time_jitter = 0.0;    ///< largest shift of a sample as a share of the period, in [0, 0.5)
-  std::vector<Interval> gaps;  ///< times [lower, upper) in which nothing is logged, s; longer than 6 periods each
-  std::uint64_t seed = 1;
-};
-
-/// Throws InvalidArgument, naming the field, unless everything in `scenario` makes sense together.
-void validate(const Scenario& scenario);
 
 /// Geometry of the scenario's robot.
 [[nodiscard]] DifferentialDrive drive_of(const Robot& robot);
@@ -243,6 +158,5 @@ class Simulation final : public LogSource {
 }  // namespace wheelwright::sim
 
 namespace wheelwright {
-using sim::Scenario;
 using sim::Simulation;
 }  // namespace wheelwright

@@ -130,7 +130,7 @@ std::string section(const DetectorChoice& choice) {
 
 }  // namespace
 
-std::string choice_report(const DetectorChoice& choice, ReportContext context) {
+std::string choice_report(const DetectorChoice& choice, CommissionContext context) {
   context.title = "Choice of a detector for " + choice.chosen->model.robot.name;
   context.lead.push_back({"choice", "Choice", section(choice)});
   return commission_report(*choice.chosen, context);

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "commission/choice/detector_choice.hpp"
-#include "results/report/page.hpp"
+#include "results/report/commission_report.hpp"
 
 namespace wheelwright::report {
 
 /// The comparison of all candidates, then the page of the chosen one (commission_report()). `choice.chosen` is there.
-[[nodiscard]] std::string choice_report(const commission::DetectorChoice& choice, ReportContext context);
+[[nodiscard]] std::string choice_report(const commission::DetectorChoice& choice, CommissionContext context);
 
 }  // namespace wheelwright::report

@@ -20,7 +20,7 @@ using namespace words;
 
 namespace {
 
-TimeAxis axis_for(const ReportContext& context) {
+TimeAxis axis_for(const CommissionContext& context) {
   if (context.signals && context.signals->rows() > 0) {
     return TimeAxis(context.signals->t);
   }
@@ -105,14 +105,9 @@ std::string kinematic_section(const commission::KinematicCommissioning& k) {
                      rows);
 }
 
-std::string signals_section(const ReportContext& context, const std::vector<ChartMark>& marks, const TimeAxis& axis) {
-  return context.signals ? signal_charts(*context.signals, marks, axis, context.rows)
-                         : paragraph("The raw signals were not handed to this page.");
-}
-
 }  // namespace
 
-std::string commission_report(const Commissioning& result, const ReportContext& context) {
+std::string commission_report(const Commissioning& result, const CommissionContext& context) {
   const TimeAxis axis = axis_for(context);
   PageContent content;
   content.title = context.title.empty() ? "Commissioning of " + result.model.robot.name : context.title;
@@ -146,25 +141,6 @@ std::string commission_report(const Commissioning& result, const ReportContext& 
   add("noise", "Noise", noise_section(result));
   add("filter", "Filter", filter_section(result));
   add("data", "Data", data_section(result, context, axis));
-  return page(content);
-}
-
-std::string failure_report(const std::string& error_message, const ReportContext& context) {
-  const TimeAxis axis = axis_for(context);
-  PageContent content;
-  content.title = context.title.empty() ? "No result" : context.title;
-  content.status = "bad";
-  content.verdict = "No result: the command stopped with an error.";
-  content.sentences = {error_message, "What could be read of the log is shown below, as it was measured."};
-  content.software = context.software;
-  content.sections.push_back({"signals", "Raw signals", signals_section(context, {}, axis)});
-  std::string data = provenance(context, axis);
-  if (!context.warnings.empty()) {
-    data += "<h3>Repairs and remarks of the log reader</h3>\n" + bullets(context.warnings);
-  }
-  if (!data.empty()) {
-    content.sections.push_back({"data", "Data", std::move(data)});
-  }
   return page(content);
 }
 

@@ -8,8 +8,10 @@
 
 #include <fmt/format.h>
 
+#include "commission/design/subject.hpp"
 #include "commission/physical.hpp"
 #include "commission/watch/risk_watch.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 #include "results/report/drawing.hpp"
 #include "results/report/page.hpp"
 #include "results/words/detect_words.hpp"

@@ -13,8 +13,8 @@
 namespace wheelwright::report {
 
 /// One self-contained HTML page: what was designed in words, the promised bounds beside those of the model and of a
-/// figure eight, the path, the commands over time, how much of each limit is used. `context.signals` and `own_log` are
-/// not used.
+/// figure eight, the path, the commands over time, how much of each limit is used. `context.signals` is not
+/// used.
 [[nodiscard]] std::string design_report(const design::BoundsDesign& design, const design::DesignSubject& subject,
                                         const design::MotionLimits& limits, const ReportContext& context);
 

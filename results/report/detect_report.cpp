@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "commission/event_isolation.hpp"
 #include "core/limits.hpp"
 #include "results/report/drawing.hpp"
 #include "results/report/outlook.hpp"

@@ -7,11 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "commission/commission.hpp"
+#include "commission/detection.hpp"
 #include "commission/margin_survey.hpp"
-#include "commission/watch/detector_walk.hpp"
-#include "commission/watch/incident_watch.hpp"
 #include "commission/watch/risk_watch.hpp"
+#include "detector/faults/isolation.hpp"
+#include "detector/faults/margins.hpp"
+#include "detector/incidents.hpp"
+#include "detector/learnt_model.hpp"
 #include "results/report/page.hpp"
 
 namespace wheelwright::report {
@@ -27,7 +29,6 @@ struct KinematicFindings {
 /// the kinematic residual. `at_risk` is the same log under the detector at a stated risk. `isolations` belong to the
 /// first events, in their order; `incidents` join all events and stand first. It loads nothing when opened; every name
 /// is escaped, every number is finite. `undecided` says why the log as a whole was not decided on; empty where it was.
-/// `context.own_log` is not used.
 [[nodiscard]] std::string detect_report(const Detection& detection, const OnlineModel& model,
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
                                         const std::vector<detector::Isolation>& isolations = {},

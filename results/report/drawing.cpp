@@ -13,6 +13,7 @@
 
 #include <fmt/format.h>
 
+#include "detector/multiscale/scale_detector.hpp"
 #include "results/report/page.hpp"
 #include "results/report/sections.hpp"
 #include "results/words/text.hpp"

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "detector/faults/fault_rows.hpp"
 #include "results/report/drawing.hpp"
 #include "results/report/page.hpp"
 #include "results/report/sections.hpp"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "bounds/support_walk.hpp"
 #include "results/report/gap_report.hpp"
 
 #include <algorithm>

@@ -45,7 +45,7 @@ namespace wheelwright::report {
 
 /// One self-contained HTML page: what was found in words, what to do next, estimators and intervals side by side with
 /// what each promises, what the log can and cannot tell, which seconds tell it, robust and constrained fits, delay,
-/// lags and Stribeck speed with their curves, kinematics, noise, raw signals, data. `context.own_log` is not used.
+/// lags and Stribeck speed with their curves, kinematics, noise, raw signals, data.
 [[nodiscard]] std::string identify_report(const inference::Identification& result, const ReportContext& context);
 
 }  // namespace wheelwright::report

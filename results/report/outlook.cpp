@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "bounds/kernels.hpp"
 #include "core/words.hpp"
 #include "results/report/drawing.hpp"
 #include "results/report/page.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "commission/margin_survey.hpp"
-#include "detector/online_model.hpp"
+#include "detector/learnt_model.hpp"
 
 namespace wheelwright::report {
 

@@ -14,8 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "commission/margin_survey.hpp"
-#include "commission/watch/detector_walk.hpp"
 #include "core/log.hpp"
 #include "core/warrant.hpp"
 #include "results/words/text.hpp"
@@ -45,9 +43,6 @@ struct ReportContext {
   std::vector<std::string> warnings;  ///< what the log reader repaired or split, one sentence each
   std::optional<LogTable> signals;    ///< raw signals; more than 2·10⁶ rows are thinned on the page, peaks kept
   std::size_t rows = 0;               ///< of the log, where it has more of them than `signals`
-  std::optional<Detection> own_log;   ///< commission_report: the model's detector on the log it was made from
-  std::optional<commission::MarginSurvey> seen;  ///< commission_report: what is certain to be seen (first_look())
-  std::vector<Section> lead{};                   ///< commission_report: before its own sections
 };
 
 using words::TimeAxis;

@@ -16,6 +16,7 @@
 #include "identify/noise_level.hpp"
 #include "results/report/drawing.hpp"
 #include "results/report/page.hpp"
+#include "results/report/signals.hpp"
 #include "results/words/commission_words.hpp"
 #include "results/words/text.hpp"
 
@@ -446,6 +447,11 @@ std::string assumptions_section(const std::vector<core::Assumption>& assumptions
              "What is taken as given, where it is declared, how the commissioning log was tested for it, and what "
              "it said. What is not tested is for whoever relies on the numbers to know.") +
          table({"Assumption", "declared by", "test", "this log"}, rows);
+}
+
+std::string signals_section(const ReportContext& context, const std::vector<ChartMark>& marks, const TimeAxis& axis) {
+  return context.signals ? signal_charts(*context.signals, marks, axis, context.rows)
+                         : paragraph("The raw signals were not handed to this page.");
 }
 
 }  // namespace wheelwright::report

@@ -49,4 +49,8 @@ namespace wheelwright::report {
 /// The assumptions with their verdicts, those that fail first, as a table; empty for none. HTML.
 [[nodiscard]] std::string assumptions_section(const std::vector<core::Assumption>& assumptions);
 
+/// The charts of the raw signals of `context` with `marks`, or that they were not handed to the page.
+[[nodiscard]] std::string signals_section(const ReportContext& context, const std::vector<ChartMark>& marks,
+                                          const TimeAxis& axis);
+
 }  // namespace wheelwright::report

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/check.hpp"
+#include "detector/multiscale/scale_detector.hpp"
 #include "results/report/drawing.hpp"
 #include "results/report/page.hpp"
 #include "results/report/sections.hpp"

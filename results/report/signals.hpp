@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "commission/watch/detector_walk.hpp"
+#include "commission/detection.hpp"
 #include "core/log.hpp"
 #include "model/robot.hpp"
 #include "results/report/page.hpp"

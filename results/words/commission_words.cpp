@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "commission/assumptions.hpp"
 #include "commission/at_risk/at_risk.hpp"
 #include "commission/at_risk/pose_at_risk.hpp"
 #include "commission/physical.hpp"

@@ -7,6 +7,9 @@
 
 #include <fmt/format.h>
 
+#include "commission/choice/detector_choice.hpp"
+#include "commission/choice/detector_trial.hpp"
+#include "commission/event_isolation.hpp"
 #include "core/limits.hpp"
 #include "core/words.hpp"
 #include "results/words/commission_words.hpp"

@@ -9,11 +9,17 @@
 #include <utility>
 #include <vector>
 
-#include "commission/choice/detector_choice.hpp"
+#include "commission/detection.hpp"
 #include "commission/margin_survey.hpp"
-#include "commission/watch/detector_walk.hpp"
-#include "commission/watch/incident_watch.hpp"
+#include "detector/faults/isolation.hpp"
+#include "detector/faults/margins.hpp"
+#include "detector/incidents.hpp"
+#include "detector/learnt_model.hpp"
 #include "results/words/text.hpp"
+
+namespace wheelwright::commission {
+struct DetectorChoice;
+}  // namespace wheelwright::commission
 
 namespace wheelwright::words {
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // wheelwright export: the header of a commissioned model decides as `wheelwright detect` does, and bad wishes are told.
+#include "detector/online_model.hpp"
 #include "formats/logs/csv.hpp"
 #include "results/model_file.hpp"
 #include "tests/app/program.hpp"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "app/common.hpp"
 #include "app/run_items.hpp"
 
 #include <atomic>

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "detector/faults/margins.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "tests/benchmarks/limit/consistency.hpp"
 #include "tests/detector/detectability.hpp"
 

@@ -20,6 +20,7 @@
 #include "commission/commission.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
+#include "detector/online_model.hpp"
 #include "formats/logs/csv.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "model/filter/row_stream.hpp"

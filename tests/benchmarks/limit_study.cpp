@@ -30,7 +30,9 @@
 
 #include "commission/commission.hpp"
 #include "core/error.hpp"
+#include "detector/faults/fault_rows.hpp"
 #include "detector/faults/margins.hpp"
+#include "detector/threshold.hpp"
 #include "formats/logs/csv.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "model/sim/simulation.hpp"

@@ -12,6 +12,7 @@
 
 #include "commission/commission.hpp"
 #include "commission/contradictions.hpp"
+#include "commission/setting.hpp"
 #include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::answered_contradictions_test {

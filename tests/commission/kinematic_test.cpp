@@ -11,6 +11,7 @@
 
 #include "commission/commission.hpp"
 #include "commission/watch/detector_walk.hpp"
+#include "detector/online_model.hpp"
 #include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::commission::kinematic_test {

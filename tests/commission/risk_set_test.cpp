@@ -12,7 +12,10 @@
 
 #include <gtest/gtest.h>
 
+#include "commission/noise_budget.hpp"
+#include "detector/detector.hpp"
 #include "detector/multiscale/scale_detector.hpp"
+#include "detector/online_model.hpp"
 #include "tests/support/exact_axis.hpp"
 #include "tests/support/most_failures.hpp"
 #include "tests/support/named_axes.hpp"

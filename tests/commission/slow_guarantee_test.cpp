@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "commission/commission.hpp"
+#include "detector/detector.hpp"
+#include "detector/online_model.hpp"
 #include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::slow_guarantee_test {

@@ -12,6 +12,7 @@
 #include "commission/contradictions.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
+#include "detector/online_model.hpp"
 #include "formats/logs/csv.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "identify/inference/identification.hpp"

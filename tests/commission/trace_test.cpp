@@ -8,6 +8,7 @@
 #include "commission/commission.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
+#include "detector/online_model.hpp"
 #include "tests/support/drives.hpp"
 
 namespace wheelwright::commission::trace_test {

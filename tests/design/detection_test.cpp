@@ -6,8 +6,12 @@
 #include <gtest/gtest.h>
 
 #include "commission/design/detection.hpp"
+#include "commission/design/subject.hpp"
 #include "core/limits.hpp"
+#include "detector/detector.hpp"
 #include "detector/faults/fault_rows.hpp"
+#include "detector/online_model.hpp"
+#include "detector/threshold.hpp"
 #include "model/sim/simulation.hpp"
 #include "tests/design/robots.hpp"
 #include "tests/support/drives.hpp"

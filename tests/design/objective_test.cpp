@@ -9,6 +9,7 @@
 
 #include "bounds/interval_hull.hpp"
 #include "commission/design/manoeuvre.hpp"
+#include "commission/design/subject.hpp"
 #include "core/error.hpp"
 #include "tests/design/robots.hpp"
 

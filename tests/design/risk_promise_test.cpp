@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Promises at a stated risk: what a plan promises against what commissioning and the detector over scales make of a log
 // that was driven along it.
+#include "commission/commission.hpp"
 #include "commission/design/risk_promise.hpp"
 
 #include <cmath>
@@ -10,9 +11,13 @@
 #include <gtest/gtest.h>
 
 #include "commission/design/stages.hpp"
+#include "commission/design/subject.hpp"
 #include "core/limits.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "detector/multiscale/scale_detector.hpp"
 #include "detector/multiscale/sum_margins.hpp"
+#include "detector/multiscale/sum_response.hpp"
+#include "model/filter/regressor_filter.hpp"
 #include "model/sim/simulation.hpp"
 #include "tests/design/robots.hpp"
 

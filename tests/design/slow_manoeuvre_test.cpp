@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A designed manoeuvre against a figure eight: both are driven in simulation, with noise and with parameters that are
 // not the believed ones, and both logs are commissioned.
+#include "commission/commission.hpp"
 #include "commission/design/manoeuvre.hpp"
 
 #include <cmath>
@@ -8,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "commission/design/subject.hpp"
 #include "model/sim/simulation.hpp"
 #include "tests/design/robots.hpp"
 

@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "commission/design/subject.hpp"
 #include "core/error.hpp"
 #include "tests/design/robots.hpp"
 

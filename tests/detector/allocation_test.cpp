@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 
 #include "commission/commission.hpp"
+#include "detector/detector.hpp"
+#include "detector/online_model.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/kinematic_drives.hpp"
 #include "tests/support/known_unicycle.hpp"

@@ -11,7 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "detector/detector.hpp"
+#include "detector/faults/fault_rows.hpp"
 #include "detector/faults/margins.hpp"
+#include "detector/faults/reference_motion.hpp"
+#include "detector/online_model.hpp"
+#include "detector/threshold.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/random.hpp"
 

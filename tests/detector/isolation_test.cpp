@@ -10,6 +10,8 @@
 
 #include "commission/watch/detector_walk.hpp"
 #include "detector/faults/isolation.hpp"
+#include "detector/faults/reference_motion.hpp"
+#include "detector/online_model.hpp"
 #include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::isolation_test {

@@ -7,6 +7,7 @@
 
 #include "core/limits.hpp"
 #include "detector/faults/margins.hpp"
+#include "detector/threshold.hpp"
 #include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::margins_test {

@@ -8,8 +8,11 @@
 
 #include "commission/kinematic.hpp"
 #include "core/limits.hpp"
+#include "detector/detector.hpp"
 #include "detector/faults/margins.hpp"
 #include "detector/faults/odometry_faults.hpp"
+#include "detector/online_model.hpp"
+#include "detector/threshold.hpp"
 #include "tests/detector/detectability.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/random.hpp"

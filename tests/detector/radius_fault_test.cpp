@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "commission/commission.hpp"
+#include "detector/detector.hpp"
+#include "detector/online_model.hpp"
+#include "detector/threshold.hpp"
 #include "tests/support/drives.hpp"
 
 namespace wheelwright::detector::radius_fault_test {

@@ -6,7 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "commission/watch/detector_walk.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "detector/multiscale/sum_isolation.hpp"
+#include "detector/multiscale/sum_response.hpp"
+#include "detector/online_model.hpp"
 #include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::sum_isolation_test {

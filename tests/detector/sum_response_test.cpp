@@ -10,7 +10,11 @@
 
 #include <gtest/gtest.h>
 
+#include "detector/faults/reference_motion.hpp"
+#include "detector/multiscale/scale_detector.hpp"
+#include "detector/multiscale/sum_kernel.hpp"
 #include "detector/multiscale/sum_margins.hpp"
+#include "detector/multiscale/sum_response.hpp"
 #include "tests/detector/detectability.hpp"
 
 namespace wheelwright::detector::sum_response_test {

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "commission/doctor/log_health.hpp"
+#include "detector/detector_options.hpp"
 #include "formats/logs/csv.hpp"
 #include "formats/robots/robot_file.hpp"
 #include "model/sim/simulation.hpp"

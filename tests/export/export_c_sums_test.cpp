@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 
 #include "detector/export/export_c.hpp"
+#include "detector/online_model.hpp"
 #include "model/differential_drive.hpp"
 #include "model/filter/motion_bound.hpp"
 #include "model/single_axis.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
+#include "detector/online_model.hpp"
 #include "formats/robots/online_model_file.hpp"
 #include "tests/fuzzers/fuzz.hpp"
 

@@ -16,6 +16,8 @@
 #include "commission/watch/detector_walk.hpp"
 #include "core/regression.hpp"
 #include "detector/faults/isolation.hpp"
+#include "detector/faults/reference_motion.hpp"
+#include "detector/online_model.hpp"
 
 namespace wheelwright::guarantee {
 namespace {

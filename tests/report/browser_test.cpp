@@ -13,6 +13,7 @@
 
 #include "results/report/commission_report.hpp"
 #include "results/report/detect_report.hpp"
+#include "results/report/failure_report.hpp"
 #include "results/report/gap_report.hpp"
 #include "results/report/health_report.hpp"
 #include "tests/report/example.hpp"
@@ -107,7 +108,7 @@ const std::string kKnown =
     "t=(i)=>0.01*i+(i%3?0:0.001)+(i<n/2?0:50)-0.001,y=(i)=>1000+Math.sin(0.01*i)+(i===Math.floor(n/3)?5:0);";
 
 TEST_F(Browser, DrawsEveryChartWithoutAScriptError) {
-  const ReportContext context = example::context(600);
+  const CommissionContext context = example::context(600);
   for (const std::string& page :
        {commission_report(example::done(), context), commission_report(example::empty(), context),
         detect_report(example::detection(600, true), example::done().model, context), failure_report("broken", context),

@@ -11,7 +11,9 @@
 #include <gtest/gtest.h>
 
 #include "commission/commission.hpp"
+#include "commission/detection.hpp"
 #include "model/differential_drive.hpp"
+#include "results/report/commission_report.hpp"
 #include "results/report/page.hpp"
 
 namespace wheelwright::report::report_example {
@@ -203,8 +205,8 @@ inline LogTable signals(std::size_t rows) {
   return table;
 }
 
-inline ReportContext context(std::size_t rows = 6000) {
-  ReportContext context;
+inline CommissionContext context(std::size_t rows = 6000) {
+  CommissionContext context;
   context.log_files = {"drive_01.csv.gz"};
   context.seeds = {{"simulation", 7}};
   context.software = "wheelwright 0.1.0";

@@ -54,7 +54,7 @@ TEST(Outlook, APageBeginsWithBothGuarantees) {
   EXPECT_THAT(html, HasSubstr("never missed"));
   EXPECT_THAT(html, HasSubstr("(one in "));
   EXPECT_THAT(html, HasSubstr("one false alarm is to be expected in 10 years"));
-  ReportContext context;
+  CommissionContext context;
   context.seen = l.seen;
   const std::string page = commission_report(l.result, context);
   const std::size_t first = page.find("What this detector will see");

@@ -11,9 +11,11 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "commission/design/subject.hpp"
 #include "results/report/commission_report.hpp"
 #include "results/report/design_report.hpp"
 #include "results/report/detect_report.hpp"
+#include "results/report/failure_report.hpp"
 #include "results/report/gap_report.hpp"
 #include "results/report/identify_report.hpp"
 #include "results/report/page.hpp"
@@ -70,7 +72,7 @@ Designed designed() {
 std::vector<std::pair<std::string, std::string>> all_pages() {
   static const inference::Identification whole = identified(false), straight = identified(true);
   static const Designed plan = designed();
-  const ReportContext context = example::context(900);
+  const CommissionContext context = example::context(900);
   return {{"done", commission_report(example::done(), context)},
           {"partial", commission_report(example::partial(), context)},
           {"nothing", commission_report(example::nothing(), context)},
@@ -137,7 +139,7 @@ TEST(EveryPage, HoldsFiniteNumbersOnly) {
 
 TEST(EveryPage, EscapesEveryName) {
   const std::string evil = "</script><script>alert(1)</script><b onclick=\"x\">&";
-  ReportContext context = example::context(300);
+  CommissionContext context = example::context(300);
   context.title = context.software = context.command_line = evil;
   context.log_files = context.warnings = {evil};
   context.seeds = {{evil, 1}};
@@ -204,7 +206,7 @@ TEST(IdentifyPage, SaysWhatWasFoundAndDrawsIt) {
 }
 
 TEST(Page, OfSixThousandBinsIsBelowTwoMegabytes) {
-  const ReportContext context = example::context(6000);
+  const CommissionContext context = example::context(6000);
   EXPECT_LT(commission_report(example::done(), context).size(), 2'000'000U);
   EXPECT_LT(detect_report(example::detection(6000, true), example::done().model, context).size(), 2'000'000U);
 }
@@ -224,7 +226,7 @@ TEST(EveryPage, HasTheTimesOfEveryChartOnce) {
 }
 
 TEST(Page, SaysThatALongLogWasThinned) {
-  ReportContext context = example::context(60);
+  CommissionContext context = example::context(60);
   EXPECT_TRUE(example::lacks(failure_report("", context), {"peaks are kept"}));
   context.rows = 5'000'000;
   EXPECT_TRUE(

@@ -48,7 +48,7 @@ commission::MarginSurvey survey_of(const Commissioning& c) {
 }
 
 std::vector<std::pair<std::string, std::string>> pages(const Commissioning& c) {
-  const ReportContext context = example::context(300);
+  const CommissionContext context = example::context(300);
   return {{"commissioning", commission_report(c, context)},
           {"fault", detect_report(example::detection(300, true), c.model, context)},
           {"healthy", detect_report(example::detection(300, false), c.model, context)},

@@ -10,6 +10,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "gap/next/discrimination.hpp"
+#include "gap/next_drive.hpp"
 #include "results/gap_json.hpp"
 #include "tests/gap/simulated_gap.hpp"
 #include "tests/report/gap_example.hpp"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kinematic section of model.json gives back the detector that was commissioned, bit for bit.
+#include "detector/detector.hpp"
+#include "detector/online_model.hpp"
 #include "results/model_json.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parameters of which a log shows noise alone are left out of the proof, and the model says so.
+#include "detector/detector_options.hpp"
 #include "results/model_check.hpp"
 
 #include <cmath>

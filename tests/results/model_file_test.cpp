@@ -8,6 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "detector/detector.hpp"
+#include "detector/detector_options.hpp"
+#include "detector/online_model.hpp"
 #include "model/sim/simulation.hpp"
 #include "results/model_file.hpp"
 #include "results/scenario_file.hpp"

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a model says at a stated risk is proved from its log; what is sharper than the log makes it is found and named.
+#include "commission/commission.hpp"
+#include "detector/detector_options.hpp"
 #include "results/model_check.hpp"
 
 #include <cmath>

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "commission/commission.hpp"
+#include "results/words/commission_summary.hpp"
 #include "results/words/commission_words.hpp"
-#include "results/words/summary.hpp"
 #include "tests/support/exact_axis.hpp"
 #include "tests/support/kinematic_drives.hpp"
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Each outcome has its sentences.
+#include "commission/assumptions.hpp"
 #include "model/fault_type.hpp"
+#include "results/report/failure_report.hpp"
 #include "results/words/commission_words.hpp"
 #include "results/words/detect_words.hpp"
 
@@ -164,7 +166,7 @@ TEST(CommissionReport, ShowsNoPhysicalValuesWithoutTheMotorsConstants) {
 }
 
 TEST(CommissionReport, BoundsNothingOfAnEmptySet) {
-  const report::ReportContext context = example::context(300);
+  const report::CommissionContext context = example::context(300);
   EXPECT_TRUE(example::holds(report::commission_report(example::done(), context), {"20.90 to 21.70", "class=\"bar\""}));
   EXPECT_TRUE(example::lacks(report::commission_report(example::empty(), context), {"20.90 to 21.70", "class=\"bar"}));
 }

@@ -5,7 +5,9 @@
 #include <numbers>
 #include <string>
 
+#include "detector/faults/fault_rows.hpp"
 #include "detector/faults/margins.hpp"
+#include "detector/faults/reference_motion.hpp"
 #include "identify/least_squares.hpp"
 #include "model/filter/row_stream.hpp"
 

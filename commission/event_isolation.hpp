@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Isolation of the faults behind the events of a detection.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "commission/detection.hpp"
+#include "core/log.hpp"
+#include "detector/faults/isolation.hpp"
+#include "detector/learnt_model.hpp"
+#include "detector/multiscale/sum_isolation.hpp"
+
+namespace wheelwright::commission {
+
+/// Options of isolate_events().
+struct EventIsolationOptions {
+  detector::IsolationOptions isolation{};
+  detector::SumIsolationOptions sums{};  ///< where the model says something at a stated risk
+  std::size_t most_events = 8;           ///< the first ones; the others are left alone
+};
+
+/// How long before the window of an isolation rows have to begin, s.
+[[nodiscard]] double isolation_memory(const OnlineModel& model);
+
+/// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against
+/// the catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
+/// Where the model says something at a stated risk, sums over all scales are asked, too (narrow_by_sums()): the log is
+/// walked once more for each event.
+[[nodiscard]] std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model,
+                                                              const Detection& detection,
+                                                              const EventIsolationOptions& options = {});
+
+/// A finding that is consistent, for people: "the right wheel's radius changes by the share 3.1 to 5.2 % since 12.4 to
+/// 12.6 s".
+[[nodiscard]] std::string sentence(const detector::FaultFinding& finding);
+
+/// All findings in a sentence: "consistent with: …; …. Excluded: …. Not examined: …", or that nothing in the catalogue
+/// explains the data.
+[[nodiscard]] std::string sentence(const detector::Isolation& isolation);
+
+}  // namespace wheelwright::commission

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Options of a detector: the set that its thresholds stand on, the comparison that decides, persistence.
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "detector/events.hpp"
+
+namespace wheelwright::detector {
+
+/// Outer description of the feasible set from which a threshold is computed.
+enum class ParameterSetKind {
+  box,       ///< the interval hull: closed form, never tighter than the polytope
+  polytope,  ///< the set itself
+};
+
+/// Comparison that decides.
+enum class Test {
+  two_sided,  ///< l <= ε <= u: does not depend on θ̂ and is never less sensitive
+  symmetric,  ///< |ε| <= ρ: the paper's (35)
+};
+
+/// Options of a detector.
+struct DetectorOptions {
+  ParameterSetKind set = ParameterSetKind::polytope;
+  Test test = Test::two_sided;
+  /// k of n; 1 of 1 (or what a commissioned model says) where it is not given, which keeps the certain detections of
+  /// fault_margin.hpp.
+  std::optional<Persistence> persistence{};
+  std::optional<Eigen::VectorXd> mu{};  ///< μ_o of (39), one for each output: constant thresholds instead of ρ(t)
+};
+
+}  // namespace wheelwright::detector

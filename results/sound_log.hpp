@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+/// \file
+/// Logs that are examined before anything is made of them.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "formats/logs/log_file.hpp"
+#include "formats/logs/recorded_log.hpp"
+#include "model/robot.hpp"
+
+namespace wheelwright::results {
+
+/// Rows by which a log is judged before a command uses it.
+inline constexpr std::size_t kExaminedRows = 200000;
+
+/// What is done with a pose that only repeats the wheels.
+enum class WheelPose {
+  judged,  ///< kept: the command finds that out itself (commission)
+  hidden,  ///< its columns are not read
+};
+
+/// A log whose units, signs and sides fit its robot.
+struct SoundLog {
+  std::unique_ptr<logs::RecordedLog> log;
+  std::vector<std::string> remarks;  ///< what was hidden and why, and what was passed over; one sentence each
+};
+
+/// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first kExaminedRows:
+/// where units, signs or sides cannot be right, InputError names the findings, and what to do. `despite` passes over
+/// findings by their names. Other fatal findings (nothing excited, a dead signal, efforts late) are left to the callers,
+/// which have an answer of their own to each. A log that lacks columns is not examined. Throws as open_log().
+[[nodiscard]] SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
+                                      logs::LogOptions reader, const std::vector<std::string>& despite, WheelPose pose,
+                                      std::size_t threads = 1);
+
+}  // namespace wheelwright::results
