@@ -13,9 +13,9 @@
 #include "app/options.hpp"
 #include "app/report_pages.hpp"
 #include "app/sound_log.hpp"
+#include "commission/identification.hpp"
 #include "core/error.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "identify/inference/identification.hpp"
 #include "results/identification_json.hpp"
 #include "results/report/identify_report.hpp"
 #include "results/software.hpp"
@@ -56,7 +56,7 @@ constexpr const char* kExamples =
 bool for_kinematics_only(const LogSource& log, const Robot& robot) {
   const std::vector<std::string> needed = robots::needed_columns(robot);
   const bool effort = std::ranges::any_of(needed, [&](const std::string& name) { return log.find(name).has_value(); });
-  return !effort && inference::shows_kinematics(log, robot);
+  return !effort && commission::shows_kinematics(log, robot);
 }
 
 int run(const Arguments& a) {
@@ -79,12 +79,12 @@ int run(const Arguments& a) {
   std::ranges::copy(opened.remarks, std::back_inserter(context.warnings));
   context.seeds = {{"bootstrap and signs", a.common.seed}};
   Progress progress(a.common.quiet);
-  inference::IdentificationOptions options;
+  commission::IdentificationOptions options;
   options.seed = a.common.seed;
   options.shapes = !a.no_shapes;
   options.progress = [&](std::string_view stage, double share) { progress.tell(stage, share); };
-  const inference::Identification result =
-      or_failure_page(a.common, context, [&] { return inference::identify(log, robot, options); });
+  const commission::Identification result =
+      or_failure_page(a.common, context, [&] { return commission::identify(log, robot, options); });
   publish(a.common, results::to_json(result, log.report(), results::software(), a.common.seed), "identification.json",
           report::identify_report(result, context));
   if (!a.common.quiet && !a.common.json) {

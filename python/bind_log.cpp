@@ -13,6 +13,7 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
+#include "commission/identification.hpp"
 #include "commission/setting.hpp"
 #include "commission/setting_rows.hpp"
 #include "core/check.hpp"
@@ -24,7 +25,6 @@
 #include "formats/logs/recorded_log.hpp"
 #include "formats/logs/row_log.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "identify/inference/identification.hpp"
 #include "identify/least_squares.hpp"
 #include "python/module.hpp"
 #include "results/identification_json.hpp"
@@ -380,7 +380,7 @@ identify::LeastSquaresFit fit(const Doubles& Y, const Doubles& y) {
 }
 
 struct IdentificationObject {
-  inference::Identification result;
+  commission::Identification result;
   logs::LogReport data;
   std::uint64_t seed = 1;
   [[nodiscard]] Json json() const { return results::to_json(result, data, results::software(), seed); }
@@ -389,7 +389,7 @@ struct IdentificationObject {
 std::unique_ptr<IdentificationObject> identify_log(LogObject& log, const RobotObject& robot, bool shapes,
                                                    std::uint64_t seed, py::object progress) {
   LongWork work(std::move(progress));
-  inference::IdentificationOptions options;
+  commission::IdentificationOptions options;
   options.seed = seed;
   options.shapes = shapes;
   options.progress = work.teller();
@@ -404,7 +404,7 @@ std::unique_ptr<IdentificationObject> identify_log(LogObject& log, const RobotOb
     }
     WatchedLog source(*log.source, work);
     auto out = std::make_unique<IdentificationObject>();
-    out->result = inference::identify(
+    out->result = commission::identify(
         source, model::with_column_errors(robot.robot, logs::interpolation_errors(given.report())), options);
     out->data = log.source->report();
     out->seed = seed;

@@ -62,7 +62,7 @@ Json physical(const Eigen::VectorXd& theta, const Scales& scales) {
   return list;
 }
 
-Json parameters_json(const inference::Identification& r, const Scales& scales) {
+Json parameters_json(const commission::Identification& r, const Scales& scales) {
   Json list = Json::array();
   const commission::Fit& fit = r.fit;
   for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
@@ -182,9 +182,9 @@ Json constrained_json(const inference::ConstrainedFit& fit, const Scales& scales
           {"active", active_json(fit.active)}};
 }
 
-Json noise_json(const std::vector<inference::ColumnNoise>& noise) {
+Json noise_json(const std::vector<commission::ColumnNoise>& noise) {
   Json list = Json::array();
-  for (const inference::ColumnNoise& n : noise) {
+  for (const commission::ColumnNoise& n : noise) {
     Json entry = {{"column", n.column},
                   {"known", nullptr},
                   {"found",
@@ -253,11 +253,11 @@ Json information_json(const inference::InformationOverTime& information) {
   return {{"coverage", inference::InformationOptions{}.coverage}, {"windows", windows}, {"parameters", parameters}};
 }
 
-Json shapes_json(const std::vector<inference::ShapeFinding>& shapes) {
+Json shapes_json(const std::vector<commission::ShapeFinding>& shapes) {
   Json list = Json::array();
-  for (const inference::ShapeFinding& f : shapes) {
+  for (const commission::ShapeFinding& f : shapes) {
     Json curve = Json::array();
-    for (const inference::ShapePoint& point : f.curve) {
+    for (const commission::ShapePoint& point : f.curve) {
       curve.push_back({point.shape, point.residual_ratio});
     }
     const bool told = f.converged && f.state == identify::ShapeState::identified;
@@ -311,7 +311,7 @@ Json data_json(const commission::Survey& survey, const logs::LogReport& data) {
 
 }  // namespace
 
-Json to_json(const inference::Identification& r, const logs::LogReport& data, const std::string& software,
+Json to_json(const commission::Identification& r, const logs::LogReport& data, const std::string& software,
              std::uint64_t seed) {
   const commission::Setting& s = r.setting;
   const Scales scales = commission::physical_scales(s.robot, s.model);

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <string>
 
+#include "commission/identification.hpp"
 #include "formats/files/json.hpp"
 #include "formats/logs/recorded_log.hpp"
-#include "identify/inference/identification.hpp"
 
 namespace wheelwright::results {
 
@@ -18,7 +18,7 @@ inline constexpr const char* kIdentificationSchema = "wheelwright/identification
 /// The whole result as JSON (results/identification.schema.json): θ_L in its own units throughout, and the physical
 /// quantities beside it where the robot file tells their scale. `data` says which log it came from, `software` is name
 /// and version, `seed` that of bootstrap and signs.
-[[nodiscard]] Json to_json(const inference::Identification& result, const logs::LogReport& data,
+[[nodiscard]] Json to_json(const commission::Identification& result, const logs::LogReport& data,
                            const std::string& software, std::uint64_t seed);
 
 }  // namespace wheelwright::results

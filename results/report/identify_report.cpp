@@ -18,7 +18,7 @@
 
 namespace wheelwright::report {
 
-using inference::Identification;
+using commission::Identification;
 
 using namespace words;
 namespace {
@@ -99,10 +99,10 @@ std::string information_bars(const inference::InformationOverTime& information, 
                            axis.repeats() ? "window of the log, in order" : "time, s");
 }
 
-std::string shape_curve(const inference::ShapeFinding& shape) {
+std::string shape_curve(const commission::ShapeFinding& shape) {
   Axis y{150.0, 12.0};
-  std::vector<inference::ShapePoint> points;
-  for (const inference::ShapePoint& point : shape.curve) {
+  std::vector<commission::ShapePoint> points;
+  for (const commission::ShapePoint& point : shape.curve) {
     if (std::isfinite(point.residual_ratio) && std::isfinite(point.shape)) {
       points.push_back(point);
       y.take(point.residual_ratio);
@@ -129,7 +129,7 @@ std::string shape_curve(const inference::ShapeFinding& shape) {
         left, width - 14.0, y(at / 100.0), left - 5.0, y(at / 100.0) + 4.0, tick_text(at, step));
   }
   out += "<polyline class=\"curve\" points=\"";
-  for (const inference::ShapePoint& point : points) {
+  for (const commission::ShapePoint& point : points) {
     out += fmt::format("{:.1f},{:.1f} ", x(point.shape), y(point.residual_ratio));
   }
   out += "\"/>";
@@ -350,7 +350,7 @@ std::string shapes_section(const Identification& r) {
   std::string out = paragraph(
       "Each of these was added alone to the model. Curves: rms of the residual with the quantity held at each value, "
       "over that without it. A curve that hardly moves is one that the log does not show.");
-  for (const inference::ShapeFinding& shape : r.shapes) {
+  for (const commission::ShapeFinding& shape : r.shapes) {
     out += paragraph(escape(in_words(shape)));
     const std::string curve = shape_curve(shape);
     out += curve.empty() ? "" : "<div class=\"wide\">" + curve + "</div>\n";
@@ -386,7 +386,7 @@ std::string kinematics_section(const Identification& r) {
 
 std::string column_noise_section(const Identification& r) {
   std::vector<std::vector<Cell>> rows;
-  for (const inference::ColumnNoise& n : r.noise) {
+  for (const commission::ColumnNoise& n : r.noise) {
     const bool found = n.choice.method != inference::NoiseMethod::none;
     const bool effort =
         std::ranges::find(r.setting.measurement.effort_columns, n.column) != r.setting.measurement.effort_columns.end();

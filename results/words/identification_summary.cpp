@@ -71,7 +71,7 @@ int decimals(double spread) {
 std::string fixed_number(double x, int digits) { return std::isfinite(x) ? fmt::format("{:.{}f}", x, digits) : "-"; }
 
 // Estimators and intervals by method are the lines; one block for each parameter keeps lines short.
-std::string comparison(const inference::Identification& r) {
+std::string comparison(const commission::Identification& r) {
   const auto shown = shown_parameters(r);
   const identify::EstimatorChoice& choice = r.fit.choice;
   std::vector<std::vector<std::string>> rows;
@@ -119,7 +119,7 @@ std::string comparison(const inference::Identification& r) {
   return aligned(rows);
 }
 
-std::string promises(const inference::Identification& r) {
+std::string promises(const commission::Identification& r) {
   std::string out;
   for (const inference::RegionRow& row : r.regions.rows) {
     const std::string name = "  " + words::spaced(inference::to_string(row.method)) + ": ";
@@ -130,9 +130,9 @@ std::string promises(const inference::Identification& r) {
   return out;
 }
 
-std::string noise_lines(const inference::Identification& r) {
+std::string noise_lines(const commission::Identification& r) {
   std::string out;
-  for (const inference::ColumnNoise& n : r.noise) {
+  for (const commission::ColumnNoise& n : r.noise) {
     const bool of_angles = n.known && (n.known->unit != n.unit || n.known->origin == "half an encoder count" ||
                                        r.setting.measurement.motion == MotionKind::angle);
     std::string text = n.known ? fmt::format("{}: ± {:.2g} {}", n.known->origin, n.known->bound, n.known->unit) : "";
@@ -152,7 +152,7 @@ std::string noise_lines(const inference::Identification& r) {
 
 }  // namespace
 
-std::string summary(const inference::Identification& r) {
+std::string summary(const commission::Identification& r) {
   std::string text = wrapped(r.setting.robot.name + ": " + verdict(r), "");
   for (const std::string& finding : findings(r)) {
     text += wrapped(finding, "  ");
@@ -165,7 +165,7 @@ std::string summary(const inference::Identification& r) {
   }
   if (!r.shapes.empty()) {
     text += "\nlooked for beside the model\n";
-    for (const inference::ShapeFinding& shape : r.shapes) {
+    for (const commission::ShapeFinding& shape : r.shapes) {
       text += wrapped(in_words(shape), "  ");
     }
   }

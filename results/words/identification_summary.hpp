@@ -5,11 +5,11 @@
 
 #include <string>
 
-#include "identify/inference/identification.hpp"
+#include "commission/identification.hpp"
 
 namespace wheelwright::words {
 
 /// Words first, then one table of estimates and intervals by every method, then what to do next.
-[[nodiscard]] std::string summary(const inference::Identification& result);
+[[nodiscard]] std::string summary(const commission::Identification& result);
 
 }  // namespace wheelwright::words

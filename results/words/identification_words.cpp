@@ -15,10 +15,10 @@
 
 namespace wheelwright::words {
 
+using commission::Identification;
+using commission::ShapeFinding;
+using commission::ShapeKind;
 using identify::Excitation;
-using inference::Identification;
-using inference::ShapeFinding;
-using inference::ShapeKind;
 
 namespace {
 
@@ -290,7 +290,7 @@ void add_noise(const Identification& r, std::vector<std::string>& steps) {
         "Noise of the motion may bias the estimate. Log the commanded speeds (command_r, command_l: they become "
         "instruments), or state encoder_counts_per_turn or noise: in the robot file.");
   }
-  for (const inference::ColumnNoise& n : r.noise) {
+  for (const commission::ColumnNoise& n : r.noise) {
     const bool loud = n.known && n.known->unit == n.unit && n.choice.method == inference::NoiseMethod::differences &&
                       n.choice.meaning == inference::NoiseMeaning::estimate && n.choice.sd > n.known->bound;
     if (loud) {

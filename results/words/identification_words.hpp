@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "commission/identification.hpp"
 #include "commission/physical.hpp"
-#include "identify/inference/identification.hpp"
 
 namespace wheelwright::words {
 
@@ -23,7 +23,7 @@ struct ShownParameter {
 };
 
 /// All parameters, in their order.
-[[nodiscard]] std::vector<ShownParameter> shown_parameters(const inference::Identification& result);
+[[nodiscard]] std::vector<ShownParameter> shown_parameters(const commission::Identification& result);
 
 /// Overall standing of the result.
 enum class IdentificationStanding {
@@ -33,7 +33,7 @@ enum class IdentificationStanding {
 };
 
 /// The standing of `result`.
-[[nodiscard]] IdentificationStanding standing(const inference::Identification& result);
+[[nodiscard]] IdentificationStanding standing(const commission::Identification& result);
 
 /// The constraints that hold `fit` back; a parameter that is left out touches zero and is not among them.
 [[nodiscard]] std::vector<inference::ActiveConstraint> binding(const inference::ConstrainedFit& fit);
@@ -43,19 +43,19 @@ inline constexpr double kShapeMatters = 0.95;
 
 /// True if `shape` is identified by the log and relevant: it lowers the residual below kShapeMatters and is either told
 /// from zero or, for the Stribeck speed, not at an end of what was searched.
-[[nodiscard]] bool matters(const inference::ShapeFinding& shape);
+[[nodiscard]] bool matters(const commission::ShapeFinding& shape);
 
 /// Estimate of a shape in one sentence: its value with its 95 % interval and what it explains, or that the log does not
 /// show it.
-[[nodiscard]] std::string in_words(const inference::ShapeFinding& shape);
+[[nodiscard]] std::string in_words(const commission::ShapeFinding& shape);
 
 /// The whole in one sentence.
-[[nodiscard]] std::string verdict(const inference::Identification& result);
+[[nodiscard]] std::string verdict(const commission::Identification& result);
 
 /// Findings, most important first, one sentence each.
-[[nodiscard]] std::vector<std::string> findings(const inference::Identification& result);
+[[nodiscard]] std::vector<std::string> findings(const commission::Identification& result);
 
 /// Missing information and the next steps, most important first, one or two sentences each; never empty.
-[[nodiscard]] std::vector<std::string> next_steps(const inference::Identification& result);
+[[nodiscard]] std::vector<std::string> next_steps(const commission::Identification& result);
 
 }  // namespace wheelwright::words

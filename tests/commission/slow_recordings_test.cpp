@@ -10,12 +10,12 @@
 
 #include "commission/commission.hpp"
 #include "commission/contradictions.hpp"
+#include "commission/identification.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "core/error.hpp"
 #include "detector/online_model.hpp"
 #include "formats/logs/csv.hpp"
 #include "formats/robots/robot_file.hpp"
-#include "identify/inference/identification.hpp"
 #include "tests/support/skip.hpp"
 
 namespace wheelwright::commission::slow_recordings_test {
@@ -112,9 +112,9 @@ TEST_F(SlowRecordings, IntervalsOfTheAxisHoldAllPublishedValues) {
   logs::CsvOptions reader;
   reader.only = {"t", "position", "effort"};
   CsvLog log({root / "data/emps/emps.csv"}, reader);
-  inference::IdentificationOptions options;
+  commission::IdentificationOptions options;
   options.shapes = false;
-  const inference::Identification result = inference::identify(log, robot, options);
+  const commission::Identification result = commission::identify(log, robot, options);
   const std::map<std::string, double> published = {
       {"inertia", 95.1089}, {"viscous", 203.5034}, {"coulomb", 20.3935}, {"offset", -3.1648}};
   ASSERT_EQ(result.setting.model.p(), published.size());

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "commission/identification.hpp"
 #include "core/error.hpp"
-#include "identify/inference/identification.hpp"
 #include "identify/time_shift.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/random.hpp"
@@ -220,7 +220,7 @@ TEST(Stribeck, SpeedAndSizeAreFound) {
       }
     }
     TableSource source(log);
-    const inference::StribeckRows model(source, filter_of(scenario));
+    const commission::StribeckRows model(source, filter_of(scenario));
     VariableProjectionOptions options;
     options.lower = Eigen::VectorXd::Constant(1, 0.05);
     options.upper = Eigen::VectorXd::Constant(1, 20.0);
@@ -251,7 +251,8 @@ model::TermValue unlike(const model::MotionState& s) {
 }
 
 // The column at ω_s = 1.7 is `expected` and stands beside the plain rows; its slope is that of differences.
-void expect_column(const inference::StribeckRows& rows, const RegressionBlock& plain, const Eigen::VectorXd& expected) {
+void expect_column(const commission::StribeckRows& rows, const RegressionBlock& plain,
+                   const Eigen::VectorXd& expected) {
   SeparableValues at;
   ASSERT_TRUE(rows.evaluate(Eigen::VectorXd::Constant(1, 1.7), true, at));
   ASSERT_EQ(at.columns.rows(), expected.size());
@@ -282,7 +283,7 @@ TEST(Stribeck, ItsColumnIsThatOfTheRegressorFilter) {
   const RegressionBlock with_term = read_all(stream);
   TorqueRows plain_stream(simulation, plain);
   const RegressionBlock rows = read_all(plain_stream);
-  expect_column(inference::StribeckRows(simulation, plain), rows, with_term.Y.col(static_cast<Eigen::Index>(last)));
+  expect_column(commission::StribeckRows(simulation, plain), rows, with_term.Y.col(static_cast<Eigen::Index>(last)));
 }
 
 // With measured speeds it is what RegressorFilter makes of efforts of this size at the samples.
@@ -300,7 +301,7 @@ TEST(Stribeck, ItsColumnIsThatOfEffortsOfItsSize) {
   TableSource of_its_size(log);
   TorqueRows stream(of_its_size, plain);
   const RegressionBlock friction = read_all(stream);
-  expect_column(inference::StribeckRows(simulation, plain), rows, friction.y);
+  expect_column(commission::StribeckRows(simulation, plain), rows, friction.y);
 }
 
 TEST(Stribeck, FastDrivingLeavesItsSpeedFlat) {
@@ -318,7 +319,7 @@ TEST(Stribeck, FastDrivingLeavesItsSpeedFlat) {
     log.columns[3].push_back(1.0 + 0.3 * std::sin(3.0 * t) + 0.05 * random.normal());
   }
   TableSource source(log);
-  const inference::StribeckRows model(source, filter_of(exact_drive(Shown::speeds, Hold::first_order)));
+  const commission::StribeckRows model(source, filter_of(exact_drive(Shown::speeds, Hold::first_order)));
   VariableProjectionOptions options;
   options.lower = Eigen::VectorXd::Constant(1, 0.1);
   options.upper = Eigen::VectorXd::Constant(1, 1.0);

@@ -32,7 +32,7 @@ namespace {
 namespace example = report_example;
 
 // A drive with a pose, whose efforts are late by two samples; without turning where `straight`.
-inference::Identification identified(bool straight) {
+commission::Identification identified(bool straight) {
   Scenario s = testing_support::exact_drive(testing_support::Shown::speeds, Hold::first_order);
   s.sensors.pose = true;
   s.sensors.effort = 0.02;
@@ -45,7 +45,7 @@ inference::Identification identified(bool straight) {
     }
   }
   TableSource log(table);
-  return inference::identify(log, s.robot);
+  return commission::identify(log, s.robot);
 }
 
 struct Designed {
@@ -70,7 +70,7 @@ Designed designed() {
 }
 
 std::vector<std::pair<std::string, std::string>> all_pages() {
-  static const inference::Identification whole = identified(false), straight = identified(true);
+  static const commission::Identification whole = identified(false), straight = identified(true);
   static const Designed plan = designed();
   const CommissionContext context = example::context(900);
   return {{"done", commission_report(example::done(), context)},
@@ -157,7 +157,7 @@ TEST(EveryPage, EscapesEveryName) {
   Commissioning contradicted = example::empty();
   contradicted.model.model.outputs[0] = contradicted.parameters[0].parameter.name = evil;
   const Detection fault = example::detection(300, true);
-  inference::Identification identification = identified(true);
+  commission::Identification identification = identified(true);
   for (std::string* text :
        {&identification.setting.robot.name, &identification.setting.model.outputs[0],
         &identification.setting.model.parameters[0].physical, &identification.setting.model.parameters[0].physical_unit,

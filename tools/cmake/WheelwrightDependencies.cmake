@@ -7,7 +7,7 @@ set(WHEELWRIGHT_NEEDS_files fmt nlohmann_json ZLIB zstd xxhash yaml-cpp tinyxml2
 set(WHEELWRIGHT_NEEDS_logs fmt zstd lz4 sqlite3 hdf5 fastcdr yaml-cpp)
 set(WHEELWRIGHT_NEEDS_robots fmt yaml-cpp tinyxml2)
 set(WHEELWRIGHT_NEEDS_identify fmt Ceres NLopt)
-set(WHEELWRIGHT_NEEDS_commission fmt)
+set(WHEELWRIGHT_NEEDS_commission fmt Ceres)
 set(WHEELWRIGHT_NEEDS_inference fmt Ceres)
 set(WHEELWRIGHT_NEEDS_doctor fmt)
 set(WHEELWRIGHT_NEEDS_design NLopt)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "identify/inference/identification.hpp"
+#include "commission/identification.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@
 #include "identify/time_shift.hpp"
 #include "model/filter/row_stream.hpp"
 
-namespace wheelwright::inference {
+namespace wheelwright::commission {
 namespace {
 
 using Jet = ceres::Jet<double, 1>;
@@ -123,14 +123,14 @@ constexpr double kMostBias = 0.5;  // standard errors, by noise of the motion: m
 constexpr double kRisk = 1e-3;     // of Fit::plausible, which is not looked at here
 constexpr double kSlowestStribeck = 0.01, kFastestStribeck = 0.5;  // of the largest joint speed
 
-std::string motion_unit(const commission::Setting& s) {
+std::string motion_unit(const Setting& s) {
   const bool linear = !model::on_two_wheels(s.robot);  // its own unit: m or rad
   return s.measurement.motion == MotionKind::angle ? (linear ? "m or rad" : "rad") : (linear ? "per s" : "rad/s");
 }
 
 // What the robot file or the encoder says of a motion column.
-std::optional<KnownNoise> known_motion_noise(const commission::Setting& s) {
-  const auto bound = commission::motion_error(s.robot, s.measurement);
+std::optional<KnownNoise> known_motion_noise(const Setting& s) {
+  const auto bound = motion_error(s.robot, s.measurement);
   if (!bound) {
     return std::nullopt;
   }
@@ -141,19 +141,19 @@ std::optional<KnownNoise> known_motion_noise(const commission::Setting& s) {
                     of_angles && counts ? "half an encoder count" : "as declared"};
 }
 
-std::vector<ColumnNoise> find_noise(LogSource& log, const commission::Setting& s) {
+std::vector<ColumnNoise> find_noise(LogSource& log, const Setting& s) {
   std::vector<std::string> columns = s.measurement.motion_columns;
   columns.insert(columns.end(), s.measurement.effort_columns.begin(), s.measurement.effort_columns.end());
   const std::vector<identify::DifferenceNoise> differences = identify::difference_noise(log, columns);
-  const Standstill standstill = standstill_noise(log, standstill_signs(log, s.model), columns);
+  const inference::Standstill standstill =
+      inference::standstill_noise(log, inference::standstill_signs(log, s.model), columns);
   std::vector<ColumnNoise> noise;
   for (std::size_t c = 0; c < columns.size(); ++c) {
     ColumnNoise of_column;
     of_column.column = columns[c];
     const bool motion = c < s.measurement.motion_columns.size();
     const bool axis = !model::on_two_wheels(s.robot);
-    of_column.unit =
-        motion ? motion_unit(s) : commission::output_unit(s.robot, axis ? s.model.output_units.front() : "N·m");
+    of_column.unit = motion ? motion_unit(s) : output_unit(s.robot, axis ? s.model.output_units.front() : "N·m");
     if (motion) {
       of_column.known = known_motion_noise(s);
     } else if (s.robot.noise.effort.value) {
@@ -161,35 +161,35 @@ std::vector<ColumnNoise> find_noise(LogSource& log, const commission::Setting& s
     }
     of_column.evidence.differences = differences[c];
     of_column.evidence.standstill = standstill.columns[c];
-    of_column.choice = choose_noise(of_column.evidence);
+    of_column.choice = inference::choose_noise(of_column.evidence);
     noise.push_back(std::move(of_column));
   }
   return noise;
 }
 
-std::vector<PhysicalQuantity> quantities(const Model& model) {
-  std::vector<PhysicalQuantity> list;
+std::vector<inference::PhysicalQuantity> quantities(const Model& model) {
+  std::vector<inference::PhysicalQuantity> list;
   for (const model::Parameter& p : model.parameters) {
     list.push_back({p.physical, p.per_physical, p.physical_unit, p.never_negative});
   }
   return list;
 }
 
-std::vector<ParameterWords> parameter_words(const commission::Setting& s, bool physical) {
-  std::vector<ParameterWords> list;
+std::vector<inference::ParameterWords> parameter_words(const Setting& s, bool physical) {
+  std::vector<inference::ParameterWords> list;
   for (const model::Parameter& p : s.model.parameters) {
     std::string name = physical ? p.physical : p.name;
     if (physical) {
       std::ranges::replace(name, '_', ' ');
     }
-    list.push_back({std::move(name), physical ? p.physical_unit : commission::parameter_unit(s.robot, p), p.excite,
-                    kind_of(p.physical)});
+    list.push_back({std::move(name), physical ? p.physical_unit : parameter_unit(s.robot, p), p.excite,
+                    inference::kind_of(p.physical)});
   }
   return list;
 }
 
 // From θ_L to physical quantities: θ_L,j = (physical quantity + offset)/scale.
-void to_physical(IdentifiabilityInput& input, const std::vector<commission::PhysicalScale>& scales) {
+void to_physical(inference::IdentifiabilityInput& input, const std::vector<PhysicalScale>& scales) {
   Eigen::VectorXd scale(static_cast<Eigen::Index>(scales.size()));
   for (std::size_t j = 0; j < scales.size(); ++j) {
     scale[static_cast<Eigen::Index>(j)] = scales[j].scale;
@@ -205,12 +205,12 @@ void to_physical(IdentifiabilityInput& input, const std::vector<commission::Phys
   input.size = input.size.cwiseProduct(scale.cwiseAbs());
 }
 
-Identifiability judge(const commission::Setting& s, const commission::Fit& fit,
-                      const identify::RegressionMoments& moments) {
-  const auto scales = commission::physical_scales(s.robot, s.model);
-  IdentifiabilityInput input = identifiability_input(fit.factor, parameter_words(s, scales.has_value()));
+inference::Identifiability judge(const Setting& s, const Fit& fit, const identify::RegressionMoments& moments) {
+  const auto scales = physical_scales(s.robot, s.model);
+  inference::IdentifiabilityInput input =
+      inference::identifiability_input(fit.factor, parameter_words(s, scales.has_value()));
   const auto p = static_cast<Eigen::Index>(s.model.p());
-  if (const auto noise = commission::row_noise(s)) {
+  if (const auto noise = row_noise(s)) {
     input.noise = Eigen::MatrixXd::Zero(p, p);
     for (std::size_t i = 0; i < noise->YY.size(); ++i) {
       const double w = fit.weights[static_cast<Eigen::Index>(i)];
@@ -230,12 +230,12 @@ Identifiability judge(const commission::Setting& s, const commission::Fit& fit,
   if (scales) {
     to_physical(input, *scales);
   }
-  return identifiability(input);
+  return inference::identifiability(input);
 }
 
 // The shape at its best and along all that was searched; `reference` is the weighted rss without it.
 ShapeFinding finding(ShapeKind kind, std::string name, std::string unit, const identify::SeparableModel& model,
-                     identify::VariableProjectionOptions options, const commission::Fit& fit, double reference,
+                     identify::VariableProjectionOptions options, const Fit& fit, double reference,
                      std::size_t points) {
   options.weights = fit.weights;
   const identify::SeparableFit found = identify::variable_projection(model, options);
@@ -264,14 +264,15 @@ ShapeFinding finding(ShapeKind kind, std::string name, std::string unit, const i
 }
 
 // Weighted residual sum of squares of `model` with its shape held at `shape`.
-double rss_at(const identify::SeparableModel& model, double shape, const commission::Fit& fit) {
+double rss_at(const identify::SeparableModel& model, double shape, const Fit& fit) {
   const Eigen::VectorXd at = Eigen::VectorXd::Constant(1, shape);
   return identify::cost_curve(model, at, 0, shape, shape + 1e-9, 2, fit.weights).front().weighted_rss;
 }
 
 // The physically consistent θ nearest to the chosen estimate, in the metric of its covariance. Parameters that are not
 // excited stay at zero.
-ConstrainedFit nearest_consistent(const commission::Fit& fit, const std::vector<LinearConstraint>& constraints) {
+inference::ConstrainedFit nearest_consistent(const Fit& fit,
+                                             const std::vector<inference::LinearConstraint>& constraints) {
   const auto p = fit.estimate.size();
   Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(p, p);
   std::vector<Eigen::Index> in;
@@ -296,12 +297,12 @@ ConstrainedFit nearest_consistent(const commission::Fit& fit, const std::vector<
   rows.y = precision * fit.estimate;
   identify::LeastSquares metric(static_cast<std::size_t>(p));
   metric.add(rows);
-  return constrained_least_squares(metric, constraints, fit.residuals.covariance);
+  return inference::constrained_least_squares(metric, constraints, fit.residuals.covariance);
 }
 
-void find_shapes(LogSource& log, const commission::Setting& s, const commission::Fit& fit,
-                 const IdentificationOptions& options, Identification& result) {
-  TorqueRows stream = commission::make_rows(log, s);
+void find_shapes(LogSource& log, const Setting& s, const Fit& fit, const IdentificationOptions& options,
+                 Identification& result) {
+  TorqueRows stream = make_rows(log, s);
   const RegressionBlock rows = read_all(stream);
   const auto look = [&](ShapeKind kind, const char* name, identify::TimeEffect effect, double lower) {
     try {
@@ -358,7 +359,7 @@ void calibrate(LogSource& log, const Robot& robot, Identification& result) {
   if (!shows_kinematics(log, robot)) {
     return;
   }
-  KinematicOptions options;
+  inference::KinematicOptions options;
   options.wheel_radius = robot.wheel_radius;
   options.track_width = robot.track_width;
   const bool position = log.find("x").has_value() && log.find("y").has_value();
@@ -366,7 +367,7 @@ void calibrate(LogSource& log, const Robot& robot, Identification& result) {
   try {
     LogTable table = read_all(log);
     add_speeds(table);
-    result.kinematics = calibrate_kinematics(table, options);
+    result.kinematics = inference::calibrate_kinematics(table, options);
   } catch (const InvalidArgument& error) {
     result.notes.push_back(fmt::format("the kinematics were not calibrated: {}", error.what()));
   }
@@ -400,29 +401,30 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
     calibrate(log, robot, result);
     return result;
   }
-  commission::SettingOptions settle_options = options.setting;
+  SettingOptions settle_options = options.setting;
   settle_options.progress = options.progress;
-  result.setting = commission::settle(log, robot, settle_options);
-  const commission::Setting& s = result.setting;
+  result.setting = settle(log, robot, settle_options);
+  const Setting& s = result.setting;
   result.notes = s.notes;
 
   tell("identifying", 0.25);
-  result.fit = commission::fit_log(log, s, commission::Part::everything, kRisk);
+  result.fit = fit_log(log, s, Part::everything, kRisk);
   tell("noise of the sensors", 0.4);
   result.noise = find_noise(log, s);
 
   tell("robust and constrained fits", 0.5);
-  const std::vector<LinearConstraint> constraints = physical_consistency(quantities(s.model), s.robot.footprint_radius);
+  const std::vector<inference::LinearConstraint> constraints =
+      inference::physical_consistency(quantities(s.model), s.robot.footprint_radius);
   result.constrained = nearest_consistent(result.fit, constraints);
-  TorqueRows rows = commission::make_rows(log, s);
-  RobustOptions robust;
+  TorqueRows rows = make_rows(log, s);
+  inference::RobustOptions robust;
   robust.constraints = constraints;
-  result.robust = robust_fit(rows, robust);
+  result.robust = inference::robust_fit(rows, robust);
 
   tell("confidence regions", 0.65);
-  const identify::RegressionMoments moments = commission::log_moments(log, s, commission::Part::everything);
+  const identify::RegressionMoments moments = log_moments(log, s, Part::everything);
   if (!result.fit.choice.candidates.empty() && result.fit.choice.best().usable) {
-    RegionOptions regions;
+    inference::RegionOptions regions;
     regions.confidence = options.confidence;
     regions.bootstrap.seed = regions.sign_perturbed.seed = options.seed;
     regions.bootstrap.estimator.weights = regions.sign_perturbed.estimator.weights = result.fit.weights;
@@ -431,13 +433,13 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
       excluded.push_back(finding.state == identify::Excitation::not_excited);
     }
     regions.bootstrap.estimator.excluded = regions.sign_perturbed.estimator.excluded = excluded;
-    result.regions = compare_regions(moments, result.fit.choice.best(), regions);
+    result.regions = inference::compare_regions(moments, result.fit.choice.best(), regions);
   }
   tell("what the log can tell", 0.75);
   result.identifiability = judge(s, result.fit, moments);
-  InformationOptions information;
+  inference::InformationOptions information;
   information.weights = result.fit.weights;
-  result.information = information_over_time(moments, information);
+  result.information = inference::information_over_time(moments, information);
 
   const identify::EstimatorChoice& choice = result.fit.choice;
   const bool noisy =
@@ -464,4 +466,4 @@ Identification identify(LogSource& log, const Robot& robot, const Identification
   return result;
 }
 
-}  // namespace wheelwright::inference
+}  // namespace wheelwright::commission

@@ -9,15 +9,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "identify/inference/identification.hpp"
+#include "commission/identification.hpp"
 #include "results/words/identification_words.hpp"
 #include "tests/support/drives.hpp"
 
-namespace wheelwright::inference::identification_test {
+namespace wheelwright::commission::identification_test {
 
 using identify::ShapeState;
 using sim::simulate;
 
+using namespace inference;
 using namespace words;
 namespace {
 
@@ -233,4 +234,4 @@ TEST(ShapeWords, SayWhereTheLogDoesNotShowIt) {
 }
 
 }  // namespace
-}  // namespace wheelwright::inference::identification_test
+}  // namespace wheelwright::commission::identification_test

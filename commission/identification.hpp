@@ -24,7 +24,7 @@
 #include "identify/variable_projection.hpp"
 #include "model/filter/regressor_filter.hpp"
 
-namespace wheelwright::inference {
+namespace wheelwright::commission {
 
 /// y_f ≈ Y_f θ + c f*(B g(ω; ω_s)), where g_j = exp(−(|ω_j|/ω_s)²) sgn ω_j at each joint, B is Model::input (joint
 /// efforts to outputs) and f the torque filter: p + 1 linear parameters, the last is c (N·m at each joint), and the
@@ -72,8 +72,8 @@ struct KnownNoise {
 struct ColumnNoise {
   std::string column;
   std::string unit;
-  NoiseEvidence evidence;
-  NoiseChoice choice;               ///< found in the log
+  inference::NoiseEvidence evidence;
+  inference::NoiseChoice choice;    ///< found in the log
   std::optional<KnownNoise> known;  ///< goes before what was found, wherever the column is an angle or made of angles
 };
 
@@ -103,7 +103,7 @@ struct ShapeFinding {
 
 /// Options of an identification.
 struct IdentificationOptions {
-  commission::SettingOptions setting;
+  SettingOptions setting;
   double confidence = 0.95;        ///< of the regions
   std::uint64_t seed = 1;          ///< of bootstrap and signs
   bool shapes = true;              ///< whether delay, lags and Stribeck speed are looked for
@@ -118,17 +118,18 @@ struct Identification {
   bool effort =
       true;  ///< the log has efforts: without, only `kinematics`, `setting`'s robot and model, and notes are given
   double confidence = 0.95;
-  commission::Setting setting;
-  commission::Fit fit;
-  std::vector<ColumnNoise> noise;   ///< motion columns, then effort columns
-  RobustFit robust;                 ///< Huber's loss, physically consistent
-  ConstrainedFit constrained;       ///< physically consistent θ nearest to the chosen estimate, by its covariance
-  RegionComparison regions;         ///< of the chosen estimate; empty where no parameter is excited
-  Identifiability identifiability;  ///< of the physical quantities where physical_scales() has them, else of θ_L
-  InformationOverTime information;
+  Setting setting;
+  Fit fit;
+  std::vector<ColumnNoise> noise;         ///< motion columns, then effort columns
+  inference::RobustFit robust;            ///< Huber's loss, physically consistent
+  inference::ConstrainedFit constrained;  ///< physically consistent θ nearest to the chosen estimate, by its covariance
+  inference::RegionComparison regions;    ///< of the chosen estimate; empty where no parameter is excited
+  inference::Identifiability
+      identifiability;  ///< of the physical quantities where physical_scales() has them, else of θ_L
+  inference::InformationOverTime information;
   std::vector<ShapeFinding> shapes;  ///< empty where they were not looked for: least squares must be unbiased for that
-  std::optional<KinematicCalibration> kinematics;  ///< where the log has a pose
-  std::vector<std::string> notes;                  ///< what was assumed, left out or could not be done
+  std::optional<inference::KinematicCalibration> kinematics;  ///< where the log has a pose
+  std::vector<std::string> notes;                             ///< what was assumed, left out or could not be done
 };
 
 /// True if `log` has the motion of both wheels, as speeds or as angles, and a heading to calibrate them by.
@@ -138,4 +139,4 @@ struct Identification {
 /// only. Throws InputError or InvalidArgument for a log or robot that cannot be used at all.
 [[nodiscard]] Identification identify(LogSource& log, const Robot& robot, const IdentificationOptions& options = {});
 
-}  // namespace wheelwright::inference
+}  // namespace wheelwright::commission
