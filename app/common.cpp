@@ -133,8 +133,8 @@ std::string beginning(const std::filesystem::path& file) {
   return text;
 }
 
-// Where the result may stand by which the files in `out` are known: in its place, and, of runs that were killed when they
-// had put some files in place, where they had gathered them.
+// Where the result may stand by which the files in `out` are known: in its place, and, of runs that were killed when
+// they had put some files in place, where they had gathered them.
 std::vector<std::filesystem::path> results_of(const CommonOptions& options, const std::string& result) {
   std::vector<std::filesystem::path> all = {options.out / result};
   std::error_code none;
@@ -439,7 +439,8 @@ void publish(const CommonOptions& options, const Json& result, const std::string
     const ResultPlace* const place = place_of(options);
     std::vector<std::string> gone = place != nullptr ? place->left : std::vector<std::string>();
     std::erase_if(gone, [&](const std::string& each) { return std::ranges::count(names, each) > 0; });
-    // Files one after another and without a break; before them what is written to as it is, which may wait for a reader.
+    // Files one after another and without a break; before them what is written to as it is, which may wait for a
+    // reader.
     const auto renamed = std::stable_partition(
         names.begin(), names.end(), [&](const std::string& each) { return !is_to_be_renamed(options.out / each); });
     std::for_each(names.begin(), renamed, [&](const std::string& each) { write_to(options.out / each, from / each); });

@@ -54,8 +54,8 @@ struct CommonOptions {
 
 /// Where say() prints: standard output, but for leave_standard_output().
 [[nodiscard]] std::FILE* stream_of_words();
-/// Leaves standard output to the result `out` where that is it, by any name: what is said goes to standard error from then
-/// on. Throws InputError with --json, which prints there, too.
+/// Leaves standard output to the result `out` where that is it, by any name: what is said goes to standard error from
+/// then on. Throws InputError with --json, which prints there, too.
 void leave_standard_output(const CommonOptions& options, const std::filesystem::path& out);
 
 /// Writes a text on a stream, fit for a terminal (files::printable). What goes wrong is found by finished().
@@ -69,7 +69,8 @@ auto in_line(const Value& value) {
     return value;
   }
 }
-/// write_text() of `text` with `values` in it, each in_line(): what a file or an argument says makes no line of its own.
+/// write_text() of `text` with `values` in it, each in_line(): what a file or an argument says makes no line of its
+/// own.
 template <typename... Values>
 void write_values(std::FILE* stream, fmt::string_view text, const Values&... values) {
   const auto write = [&](const auto&... fit) { write_text(stream, fmt::vformat(text, fmt::make_format_args(fit...))); };
@@ -89,8 +90,8 @@ template <typename... Values>
 void tell(fmt::format_string<Values...> text, Values&&... values) {
   write_values(stderr, text, values...);
 }
-/// Prints an error on standard error. Lines of its own begin with a blank: other line ends come from files and arguments,
-/// and are shown.
+/// Prints an error on standard error. Lines of its own begin with a blank: other line ends come from files and
+/// arguments, and are shown.
 void tell_error(std::string_view message);
 /// Standard output takes no more: finished() says so, and why.
 class OutputLost : public Error {
@@ -122,19 +123,19 @@ void keep_inputs(const CommonOptions& options, const std::vector<std::string>& f
 /// replace what the command line names to be read, and, unless --force is given, where something else would be replaced
 /// than the command's own earlier result. `files` are the names that it may write beside report.html: first the result,
 /// KIND.json of the schema wheelwright/KIND, by which it knows itself, then what else it writes, which is its own where
-/// it is not younger than that. Where there are any, `out` is locked until the program ends: InputError where another one
-/// writes results into it, unless both share it.
+/// it is not younger than that. Where there are any, `out` is locked until the program ends: InputError where another
+/// one writes results into it, unless both share it.
 void make_directory(const CommonOptions& options, const std::vector<std::string>& files = {},
                     files::PathLock::Kind lock = files::PathLock::Kind::alone);
-/// The lock of `path`, which may have been removed (PathLock::gone()); InputError, calling it `shown`, where another run
-/// has what is there.
+/// The lock of `path`, which may have been removed (PathLock::gone()); InputError, calling it `shown`, where another
+/// run has what is there.
 [[nodiscard]] std::unique_ptr<files::PathLock> lock_or_refuse(const std::filesystem::path& path,
                                                               files::PathLock::Kind kind, const std::string& shown);
 /// Removes what make_directory() made and nothing was put into: a run that failed leaves no empty directories.
 void remove_empty_directories();
 
-/// Writes out/report.html where a directory is wanted, with the name of the command in its head; nothing where an earlier
-/// result of the command stands there, whose page stays beside it.
+/// Writes out/report.html where a directory is wanted, with the name of the command in its head; nothing where an
+/// earlier result of the command stands there, whose page stays beside it.
 void write_failure_page(const CommonOptions& options, std::string page);
 
 /// Directory inside of `out` (not empty) for the files of a result that stand beside its JSON: publish() moves them out

@@ -30,10 +30,10 @@ namespace wheelwright::commission {
 /// efforts to outputs) and f the torque filter: p + 1 linear parameters, the last is c (N·m at each joint), and the
 /// shape ω_s (rad/s, or m/s for a joint that is driven straight).
 ///
-/// The recursion is RegressorFilter's own (model/filter/kernel.hpp). Measured speeds give g at the samples, linear between
-/// them as measured efforts are; angles and mean speeds give g of each step's mean speed, as every other function of
-/// the motion. A model with Coulomb friction already in Y keeps it: c is what is added at low speed. Without slow
-/// driving ω_s is flat (ShapeState::flat).
+/// The recursion is RegressorFilter's own (model/filter/kernel.hpp). Measured speeds give g at the samples, linear
+/// between them as measured efforts are; angles and mean speeds give g of each step's mean speed, as every other
+/// function of the motion. A model with Coulomb friction already in Y keeps it: c is what is added at low speed.
+/// Without slow driving ω_s is flat (ShapeState::flat).
 class StribeckRows final : public identify::SeparableModel {
  public:
   /// Walks `log` once through `filter` and keeps the rows. Throws InvalidArgument when the log lacks a column of the

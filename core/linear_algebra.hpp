@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Dense decompositions of small matrices, compiled once: the other rooms see declarations, not Eigen's templates.
+/// Dense decompositions of small matrices, compiled once: the other modules see declarations, not Eigen's templates.
 ///
 /// Sizes that do not fit each other are programming errors, as in Eigen. A matrix that is not finite gives results that
 /// are not finite. References: Golub and Van Loan, Matrix Computations, 4th ed., chapters 3, 5 and 8.

@@ -11,7 +11,8 @@ namespace wheelwright::core {
 /// Kind of promise of a bound, a threshold or a margin. Results name it per number, and these words are used in no
 /// other sense.
 enum class Warrant {
-  guaranteed,  ///< declared bounds of the sensors, and assumptions of which no test failed (docs/methods/assumptions.md)
+  /// Declared bounds of the sensors, and assumptions of which no test failed (docs/methods/assumptions.md).
+  guaranteed,
   extrapolated,  ///< noise bounds learnt from a log, or an assumption that the log contradicts
   statistical,   ///< declared noise that is also independent from sample to sample, at a stated confidence
 };

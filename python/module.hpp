@@ -47,7 +47,7 @@ class LongWork {
   /// `progress` is None or is called as progress(fraction, text), with the lock, on the thread that works.
   explicit LongWork(py::object progress) : progress_(std::move(progress)) {}
 
-  /// What a room of the toolkit is to be told with.
+  /// What a module of the toolkit is to be told with.
   [[nodiscard]] std::function<void(std::string_view, double)> teller() {
     return [this](std::string_view text, double share) { tell(text, share); };
   }
@@ -117,7 +117,7 @@ auto LongWork::run(const Work& work) -> decltype(work()) {
       throw;
     }
   }
-  // Whatever the rooms made of Stopped, the Python exception is what happened.
+  // Whatever the modules made of Stopped, the Python exception is what happened.
   if (failure_) {
     throw py::error_already_set(*failure_);
   }

@@ -32,8 +32,8 @@ struct SoundLog {
 
 /// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first kExaminedRows:
 /// where units, signs or sides cannot be right, InputError names the findings, and what to do. `despite` passes over
-/// findings by their names. Other fatal findings (nothing excited, a dead signal, efforts late) are left to the callers,
-/// which have an answer of their own to each. A log that lacks columns is not examined. Throws as open_log().
+/// findings by their names. Other fatal findings (nothing excited, a dead signal, efforts late) are left to the
+/// callers, which have an answer of their own to each. A log that lacks columns is not examined. Throws as open_log().
 [[nodiscard]] SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
                                       logs::LogOptions reader, const std::vector<std::string>& despite, WheelPose pose,
                                       std::size_t threads = 1);

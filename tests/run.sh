@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs what is missing, builds, and runs the tests, but for those that take minutes each (tests/long.sh). What was skipped
-# is told at the end, with what it lacks: tools/setup.sh --ci installs that.
-# Arguments go to ctest instead: tests/run.sh -R bounds
+# Installs what is missing, builds, and runs the tests, but for those that take minutes each (tests/long.sh). What was
+# skipped is told at the end, with what it lacks: tools/setup.sh --ci installs that. Arguments go to ctest instead:
+# tests/run.sh -R bounds
 set -eu
 cd "$(dirname "$0")/.."
 tools/setup.sh

@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
 #
-# Wheelwright and Foxglove's npm packages read the same numbers out of each other's recordings of ROS 2 messages; and the
-# databases that Wheelwright writes are whole for the sqlite3 program. Wants Node and npm, and fetches four packages from
-# npm into a scratch directory; ctest does not run it.
+# Wheelwright and Foxglove's npm packages read the same numbers out of each other's recordings of ROS 2 messages; and
+# the databases that Wheelwright writes are whole for the sqlite3 program. Wants Node and npm, and fetches four packages
+# from npm into a scratch directory; ctest does not run it.
 set -eu
 cd "$(dirname "$0")/.."
 scratch=$(mktemp -d)

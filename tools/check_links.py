@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Links inside the repository's Markdown lead somewhere: to files that exist and headings that they have. So do file
-names in backquotes, `room/file.hpp` or `tests/room/file.cpp`. Addresses on the network are not looked at.
+names in backquotes, `module/file.hpp` or `tests/module/file.cpp`. Addresses on the network are not looked at.
 
     check_links.py [ROOT]        exit code 1 and a line for each that leads nowhere
     check_links.py --self-test   the check notices what it is for

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Which lines of the product ran, by room, after a build with --coverage was used (tests/long.sh coverage).
+"""Which lines of the product ran, by module, after a build with --coverage was used (tests/long.sh coverage).
 
     tools/coverage.py [FOLDER]               a table in Markdown, of build-coverage or of another build folder
     tools/coverage.py [FOLDER] --uncovered   then what did not run, as file:first-last
     tools/coverage.py [FOLDER] --source      the same with the text of these lines
     tools/coverage.py --self-test
 
-    --room ROOM    this room alone; may be given several times
+    --module MODULE    this module alone; may be given several times
 
 A line can run when GCC made code of it in any object: templates that nothing instantiates and inline functions that
 nothing calls are not counted, nor are lines without a letter or digit, nor a second `return` of a constant that GCC
@@ -33,12 +33,12 @@ PRODUCT = list(check_layers.MODULES)
 
 
 def counts_of(folder, root):
-    """File below a room of `root` -> line -> how often it ran, of all objects below `folder`."""
+    """File below a module of `root` -> line -> how often it ran, of all objects below `folder`."""
     counts = defaultdict(lambda: defaultdict(int))
     names = {}
 
     def name_of(path):
-        """The file's name below `root`, through links of the build folder; None where it is in no room."""
+        """The file's name below `root`, through links of the build folder; None where it is in no module."""
         if path not in names:
             real = Path(path).resolve()
             inside = real.relative_to(root).as_posix() if real.is_relative_to(root) else ""
@@ -64,22 +64,22 @@ def only_words(counts, root):
 
 
 def table(counts):
-    """Markdown: lines that can run and the share of them that did, by room and of all."""
-    rooms = {room: [0, 0] for room in PRODUCT}
+    """Markdown: lines that can run and the share of them that did, by module and of all."""
+    modules = {module: [0, 0] for module in PRODUCT}
     for name, lines in counts.items():
-        room = rooms[check_layers.module_of(name)]
-        room[0] += len(lines)
-        room[1] += sum(count != 0 for count in lines.values())
-    rows = ["| room | lines | did not run | ran |", "|---|---|---|---|"]
-    every = [sum(numbers) for numbers in zip(*rooms.values())]
-    for room, (lines, ran) in [*rooms.items(), ("all", every)]:
+        module = modules[check_layers.module_of(name)]
+        module[0] += len(lines)
+        module[1] += sum(count != 0 for count in lines.values())
+    rows = ["| module | lines | did not run | ran |", "|---|---|---|---|"]
+    every = [sum(numbers) for numbers in zip(*modules.values())]
+    for module, (lines, ran) in [*modules.items(), ("all", every)]:
         if lines:
-            rows.append(f"| {room} | {lines:,} | {lines - ran:,} | {100 * ran / lines:.1f} % |")
+            rows.append(f"| {module} | {lines:,} | {lines - ran:,} | {100 * ran / lines:.1f} % |")
     return "\n".join(rows)
 
 
 def uncovered(counts):
-    """(file, first, last) of what did not run, with nothing that ran in between; rooms in their order, then by name."""
+    """(file, first, last) of what did not run, with nothing that ran in between; modules in their order, then by name."""
     found = []
     for name in sorted(counts, key=lambda name: (PRODUCT.index(check_layers.module_of(name)), name)):
         open_one = None
@@ -145,7 +145,7 @@ def main():
     parser.add_argument("folder", nargs="?", type=Path, default=ROOT / "build-coverage")
     for option in ("--uncovered", "--source", "--self-test"):
         parser.add_argument(option, action="store_true")
-    parser.add_argument("--room", action="append", choices=PRODUCT)
+    parser.add_argument("--module", action="append", choices=PRODUCT)
     arguments = parser.parse_args()
     if arguments.self_test:
         self_test()
@@ -153,8 +153,8 @@ def main():
     counts, texts = only_words(counts_of(arguments.folder.resolve(), ROOT), ROOT)
     if not counts:
         sys.exit(f"coverage: no counts in {arguments.folder}: build it with the preset `coverage`")
-    if arguments.room:
-        counts = {name: lines for name, lines in counts.items() if check_layers.module_of(name) in arguments.room}
+    if arguments.module:
+        counts = {name: lines for name, lines in counts.items() if check_layers.module_of(name) in arguments.module}
     print(table(counts))
     if arguments.uncovered or arguments.source:
         print()

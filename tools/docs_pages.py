@@ -3,7 +3,7 @@
 """The pages of the documentation that are made from the program, the schemas and the headers.
 
     docs_pages.py PROGRAM TAGS OUT      OUT/commands.md: the --help of every command; OUT/files.md: the JSON files by
-                                        their schemas; OUT/api.md: the installed headers by room, with links into
+                                        their schemas; OUT/api.md: the installed headers by module, with links into
                                         Doxygen's pages, which its tag file TAGS lists; OUT/references.md: the
                                         bibliography
     docs_pages.py --check SITE          exit code 1 where a page of SITE links to what SITE does not have, or fetches
@@ -25,7 +25,7 @@ from pathlib import Path
 import check_layers
 
 ROOT = Path(__file__).resolve().parent.parent
-ROOMS = {
+MODULES = {
     "core": "errors, argument checks, outward-rounded intervals, log table, regression rows, linear algebra, "
             "statistics",
     "model": "robots as data, their faults and effects",
@@ -151,15 +151,15 @@ def api(tags):
         place = os.path.relpath(compound.findtext("path", ""), ROOT)
         pages[f"{place}/{compound.findtext('name')}"] = compound.findtext("filename", "")
     out = ("# C++ library\n\n"
-           "One target for each room: `find_package(Wheelwright 0.1 REQUIRED COMPONENTS detector)`, then "
-           "`target_link_libraries(… Wheelwright::detector)`. Headers are `<wheelwright/ROOM/HEADER>`. "
+           "One target for each module: `find_package(Wheelwright 0.1 REQUIRED COMPONENTS detector)`, then "
+           "`target_link_libraries(… Wheelwright::detector)`. Headers are `<wheelwright/MODULE/HEADER>`. "
            '<a href="../api/index.html">All pages</a>, <a href="../api/annotated.html">all types</a>.\n')
     public = check_layers.public_headers(ROOT)
-    for room, what in ROOMS.items():
-        headers = sorted(public.get(room, ()))
+    for module, what in MODULES.items():
+        headers = sorted(public.get(module, ()))
         if not headers:
             continue
-        out += f"\n## {room}\n\n{what[0].upper() + what[1:]}.\n\n| header | |\n|---|---|\n"
+        out += f"\n## {module}\n\n{what[0].upper() + what[1:]}.\n\n| header | |\n|---|---|\n"
         for header in headers:
             page = pages.get(header)
             assert page, f"{header}: Doxygen has no page of it"

@@ -5,7 +5,8 @@
 #
 #   tools/setup.sh program  Debian packages for the program, and uPlot from npm
 #   tools/setup.sh          the same and what tests, benchmarks, Python and the independent world need
-#   tools/setup.sh --ci     the same and clang-format, clang-tidy and clang, which continuous integration uses, and what some
+#   tools/setup.sh --ci     the same and clang-format, clang-tidy and clang, which continuous integration uses, and what
+#   some
 #                           tests need that are skipped elsewhere: a browser, shells, man, matplotlib, … (half a minute,
 #                           nearly all of it Chromium's)
 #   tools/setup.sh --fuzz   the same as without and clang with its run-time libraries
@@ -79,8 +80,8 @@ fi
 # shellcheck disable=SC2086
 install $packages
 
-# uPlot draws the time series of the report. npm checks it against package-lock.json; where there is no npm, which would bring
-# three hundred packages, its registry's archive is fetched and checked the same way.
+# uPlot draws the time series of the report. npm checks it against package-lock.json; where there is no npm, which would
+# bring three hundred packages, its registry's archive is fetched and checked the same way.
 cd results/report
 if ! cmp -s package-lock.json node_modules/.wheelwright-lock; then
   echo "setup: fetching uPlot from npm's registry"

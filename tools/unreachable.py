@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Which functions of the product no command, binding or example reaches, by room, with their lines.
+"""Which functions of the product no command, binding or example reaches, by module, with their lines.
 
     tools/unreachable.py              builds the product in build-unreachable (minutes, at first), then a table and a
                                       list
@@ -76,7 +76,7 @@ def in_the_product(path):
 
 
 def places(binary, functions):
-    """(file, line) -> names of the functions that begin there, of those in a room's folder."""
+    """(file, line) -> names of the functions that begin there, of those in a module's folder."""
     asked = [(address, name) for name, addresses in functions.items() for address in addresses]
     answers = run("addr2line", "-e", binary, input="".join(address + "\n" for address, _ in asked),
                   stdout=subprocess.PIPE).stdout.splitlines()
@@ -220,11 +220,11 @@ def is_accessor(texts, place):
 
 
 def table(found):
-    rooms = defaultdict(set)
+    modules = defaultdict(set)
     for name, first, last, _ in found:
-        rooms[check_layers.module_of(name)].update((name, line) for line in range(first, last + 1))
-    lines = [f"{len(at):6,}  {room}" for room, at in sorted(rooms.items(), key=lambda item: -len(item[1]))]
-    lines.append(f"{sum(map(len, rooms.values())):6,}  lines that nothing reaches, in {len(found)} places")
+        modules[check_layers.module_of(name)].update((name, line) for line in range(first, last + 1))
+    lines = [f"{len(at):6,}  {module}" for module, at in sorted(modules.items(), key=lambda item: -len(item[1]))]
+    lines.append(f"{sum(map(len, modules.values())):6,}  lines that nothing reaches, in {len(found)} places")
     lines += [f"{name}:{first}-{last}: {title}" for name, first, last, title in found]
     return "\n".join(lines)
 

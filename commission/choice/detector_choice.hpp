@@ -65,9 +65,9 @@ struct DetectorChoice {
 /// is refined between the best one's neighbours. β spans from order/β = window, as far as the log's length allows, to
 /// βh = 0.5.
 ///
-/// Sums at a stated risk (detector/multiscale/scale_detector.hpp) do not pass through the filter. A candidate changes them by what
-/// its order reads, speeds or angles, and through the guaranteed set, of which the set at the risk is a part. Sizes are
-/// compared for every noise, unless `either` is asked for; what holds at the risk is told beside them.
+/// Sums at a stated risk (detector/multiscale/scale_detector.hpp) do not pass through the filter. A candidate changes
+/// them by what its order reads, speeds or angles, and through the guaranteed set, of which the set at the risk is a
+/// part. Sizes are compared for every noise, unless `either` is asked for; what holds at the risk is told beside them.
 ///
 /// It looks at the torque residual only. All candidates learn from the log that they are judged on: margins are proofs
 /// for each of them, whichever is chosen, and an hourly guarantee counts all of them in (hourly_confidence; trial.tried

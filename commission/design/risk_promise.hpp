@@ -3,14 +3,15 @@
 /// What a plan promises at a stated risk, where errors average out: bounds, and the smallest certain faults.
 ///
 /// **Bounds.** A log along the plan gives the guaranteed set P(e), and tangent slabs |y_f − Y_f θ| <= dy_f of an
-/// ellipsoid (commission/at_risk/risk_set.hpp). Y_f, the summed variances V and dy_f are made of the motion and of the efforts
-/// that it takes, up to terms of second order in the errors; only y_f depends on the errors that came true. Two members
-/// of one such set differ by a d with |Y_f d| <= 2 dy_f, whatever y_f is. So the set of the log without noise is as
-/// wide as any, and it is what is promised: as for the guaranteed bounds (plan.hpp), and by the code of commissioning.
+/// ellipsoid (commission/at_risk/risk_set.hpp). Y_f, the summed variances V and dy_f are made of the motion and of the
+/// efforts that it takes, up to terms of second order in the errors; only y_f depends on the errors that came true. Two
+/// members of one such set differ by a d with |Y_f d| <= 2 dy_f, whatever y_f is. So the set of the log without noise
+/// is as wide as any, and it is what is promised: as for the guaranteed bounds (plan.hpp), and by the code of
+/// commissioning.
 ///
 /// **Faults.** The sums of the detector at a stated risk along the planned log, with weights, V, radii and what the set
-/// leaves open as on a drive (detector/multiscale/sum_response.hpp); looks allow for any log that the sensors may write of it. The
-/// fault is there from before the plan begins, so that it has no onset and no jump.
+/// leaves open as on a drive (detector/multiscale/sum_response.hpp); looks allow for any log that the sensors may write
+/// of it. The fault is there from before the plan begins, so that it has no onset and no jump.
 #pragma once
 
 #include <vector>

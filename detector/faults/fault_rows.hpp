@@ -126,9 +126,9 @@ class SignatureErrors {
   Row out_;
 };
 
-/// A fault's signature along a reference motion, element by element of the weak form (model/filter/element_filter.hpp): what
-/// it adds between one instant and the next is shares()[0] at_begin() + shares()[1] at_end(), and in the first element
-/// after an onset jump(), whatever weights the elements are summed with.
+/// A fault's signature along a reference motion, element by element of the weak form (model/filter/element_filter.hpp):
+/// what it adds between one instant and the next is shares()[0] at_begin() + shares()[1] at_end(), and in the first
+/// element after an onset jump(), whatever weights the elements are summed with.
 ///
 /// Products with the fault's profile need no derivative of noise. At the onset of a step the robot's own speed goes on
 /// (its mass sees to that) and what the encoders show jumps; the reading of an effort changes with no more than its

@@ -41,7 +41,8 @@ Eigen::MatrixXd largest_root(const Eigen::MatrixXd& middle, const Eigen::MatrixX
   return pairs.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * pairs.vectors.transpose();
 }
 
-// a · b, from the first element to the last: the same digits in every language and build (detector/export/export_c_sums.hpp).
+// a · b, from the first element to the last: the same digits in every language and build
+// (detector/export/export_c_sums.hpp).
 template <typename A, typename B>
 double dot_in_order(const A& a, const B& b) {
   double sum = a[0] * b[0];

@@ -47,7 +47,8 @@ struct SumState {
   double averaged = 0.0;  ///< the part of `radius` that errors have which average out
 };
 
-/// Numbers of a ScaleDetector that do not change from sample to sample, for its form in C (detector/export/export_c.hpp).
+/// Numbers of a ScaleDetector that do not change from sample to sample, for its form in C
+/// (detector/export/export_c.hpp).
 struct SumConstants {
   Eigen::VectorXd largest, half;  ///< p: |θ| at most, sides of the set's box from θ̂ on
   Eigen::MatrixXd inverse;        ///< n × n: (N Nᵀ)⁻¹, N the model's input

@@ -8,7 +8,8 @@
 namespace wheelwright::gap {
 
 /// What became of diagnoses like this one: with its verdict, and one or several causes named first. The counts are
-/// those of `tests/campaigns/calibrate_gap.py` (docs/methods/gap.md has the worlds, and the same table judged on others).
+/// those of `tests/campaigns/calibrate_gap.py` (docs/methods/gap.md has the worlds, and the same table judged on
+/// others).
 [[nodiscard]] TrackRecord track_record(const Diagnosis& diagnosis);
 
 /// Gives `diagnosis` its record, and its causes and credible sets their probabilities: of the first set, of the others

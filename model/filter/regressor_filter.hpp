@@ -26,8 +26,8 @@ struct FilteredRow {
   Eigen::VectorXd dy;  ///< n, n̄ >= 0
 };
 
-/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of docs/methods/notation.md for Y_f, with
-/// kernels that need no motion between samples for the acceleration, whatever the steps.
+/// Filters torque and regressor sample by sample: (28) for τ_f, the identities of docs/methods/notation.md for Y_f,
+/// with kernels that need no motion between samples for the acceleration, whatever the steps.
 ///
 /// A row is the equation (20) multiplied by a weight w and integrated. For **angles** w goes linearly from one sample
 /// to the next, with the values of a smoothed f₂ there (kernel.hpp), from 0 at the first sample of a segment: ẅ is a

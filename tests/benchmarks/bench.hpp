@@ -40,7 +40,7 @@ struct Work {
 
 /// What a line says beside the times.
 struct Subject {
-  std::string name;      ///< room and subject, e.g. "logs/csv"
+  std::string name;      ///< module and subject, e.g. "logs/csv"
   std::size_t rows = 0;  ///< rows of the problem
   int p = 0;             ///< number of parameters, 0 where there are none
   int threads = 1;       ///< threads used

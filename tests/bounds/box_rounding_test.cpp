@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each step that rounds the support of a box outward, against rationals with zero tolerance. tests/campaigns/mutate_rounding.sh
-// takes the steps away one by one, and these tests have to notice.
+// Each step that rounds the support of a box outward, against rationals with zero tolerance.
+// tests/campaigns/mutate_rounding.sh takes the steps away one by one, and these tests have to notice.
 #include <cmath>
 #include <vector>
 

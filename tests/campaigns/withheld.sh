@@ -3,7 +3,8 @@
 #
 # Withheld effects: has `wheelwright gap` name what another physics engine hid in logs, and scores the answers.
 #
-#   tests/campaigns/withheld.sh [--seed S] [--cases N] [--profile standard|plain|hard] [--kind KIND] [--laws LAWS] [--duration S]
+#   tests/campaigns/withheld.sh [--seed S] [--cases N] [--profile standard|plain|hard] [--kind KIND] [--laws LAWS]
+#   [--duration S]
 #                     [--out DIR] [--only naive|removed] [SET]
 #
 # SET is a directory of cases that is there already: case_*/ (or logs/case_*/) beside answers.json. Without it a set is

@@ -186,8 +186,8 @@ TEST(PoseAtRisk, NothingIsSaidWithoutABias) {
   EXPECT_EQ(std::ranges::count(result.assumptions, kPoseNoiseAverages, &core::Assumption::id), 0);
 }
 
-// Not a promise but a table of docs/methods/risk.md: the smallest sizes seen within 1, 5 and 20 s, median of five drives, by
-// the dead zone, by sums, and by sums where the errors' deviation is declared, too.
+// Not a promise but a table of docs/methods/risk.md: the smallest sizes seen within 1, 5 and 20 s, median of five
+// drives, by the dead zone, by sums, and by sums where the errors' deviation is declared, too.
 TEST(SlowPoseAtRisk, SizesSeen) {
   ExactUnicycle healthy;
   healthy.seconds = 120.0;

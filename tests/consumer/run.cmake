@@ -3,8 +3,8 @@
 # cmake -DBUILD=build tree -DSCRATCH=directory -DCOMPILER=c++ [-DFLAGS=...] [-DPROGRAM=wheelwright] -P run.cmake
 #
 # Installs the build tree into a scratch prefix, then configures, builds and runs the project beside this file with
-# nothing but that prefix: a user of the rooms core and model, and a monitor of detector and robots, which must ask for
-# and link none of FORBIDDEN and, with the program given, sees what `wheelwright detect` sees.
+# nothing but that prefix: a user of the modules core and model, and a monitor of detector and robots, which must ask
+# for and link none of FORBIDDEN and, with the program given, sees what `wheelwright detect` sees.
 set(FORBIDDEN ceres nlopt hdf5 sqlite)
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE result)

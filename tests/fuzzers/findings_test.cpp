@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What fuzzers found once (tests/fuzzers/found/NAME/*) and what they learnt (tests/fuzzers/corpus/NAME.gz), handed to them again.
+// What fuzzers found once (tests/fuzzers/found/NAME/*) and what they learnt (tests/fuzzers/corpus/NAME.gz), handed to
+// them again.
 #include <cstddef>
 #include <filesystem>
 #include <iostream>

@@ -70,7 +70,8 @@ inline std::string bytes_of(const std::filesystem::path& file) {
   return read.str();
 }
 
-/// The corpus of the fuzzer `name`, as tests/fuzzers/corpus.py packs it: "SIZE\n", the input and a line end, again and again.
+/// The corpus of the fuzzer `name`, as tests/fuzzers/corpus.py packs it: "SIZE\n", the input and a line end, again and
+/// again.
 inline std::vector<std::string> corpus_of(const std::string& name) {
   constexpr std::size_t kMost = std::size_t{16} << 20;
   const std::string packed = files::read_bytes(fuzz_folder() / "corpus" / (name + ".gz"), kMost);

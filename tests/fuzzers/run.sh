@@ -34,7 +34,8 @@ TMPDIR=$(mktemp -d -p "$memory" wheelwright-fuzzers-XXXXXX)  # files of a moment
 export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 export LSAN_OPTIONS=suppressions=tests/support/leaks.supp:print_suppressions=0
-# The HDF5 library asks for what damaged files say, and lives without. Traces and a quarantine of normal size double the time.
+# The HDF5 library asks for what damaged files say, and lives without. Traces and a quarantine of normal size double the
+# time.
 export ASAN_OPTIONS=allocator_may_return_null=1:malloc_context_size=4:quarantine_size_mb=16
 failed=''
 printf '%-10s %12s %10s %10s\n' fuzzer executions coverage corpus

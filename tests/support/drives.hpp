@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Simulated drives that the tests of several rooms share, and the filtered rows they give.
+/// Simulated drives that the tests of several modules share, and the filtered rows they give.
 #pragma once
 
 #include <array>

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# Part of the installation: writes OUT/wheelwright/x/y.hpp for each line "x/y.hpp" of the file HEADERS, from SOURCE/x/y.hpp,
-# with #include <wheelwright/x/z.hpp> in place of #include "x/z.hpp". A header that includes one of ours that HEADERS does not
-# name is an error.
+# Part of the installation: writes OUT/wheelwright/x/y.hpp for each line "x/y.hpp" of the file HEADERS, from
+# SOURCE/x/y.hpp, with #include <wheelwright/x/z.hpp> in place of #include "x/z.hpp". A header that includes one of ours
+# that HEADERS does not name is an error.
 file(STRINGS "${HEADERS}" headers)
 foreach(header IN LISTS headers)
   set(file "${OUT}/wheelwright/${header}")

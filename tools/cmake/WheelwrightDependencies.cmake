@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
-# What each room links beyond the rooms below it. The build and the installed package look for what the rooms asked for
-# need, and for nothing else: wheelwright_find_for(ROOM...).
+# What each module links beyond the modules below it. The build and the installed package look for what the modules
+# asked for need, and for nothing else: wheelwright_find_for(MODULE...).
 set(WHEELWRIGHT_NEEDS_core Eigen3 Boost)
 set(WHEELWRIGHT_NEEDS_files fmt nlohmann_json ZLIB zstd xxhash yaml-cpp tinyxml2)
 set(WHEELWRIGHT_NEEDS_logs fmt zstd lz4 sqlite3 hdf5 fastcdr yaml-cpp)
@@ -19,8 +19,8 @@ set(WHEELWRIGHT_NEEDS_report fmt nlohmann_json ZLIB)
 # A macro: what is found belongs to the directory that asks.
 macro(wheelwright_find_for)
   set(_wheelwright_needs)
-  foreach(_room ${ARGN})
-    list(APPEND _wheelwright_needs ${WHEELWRIGHT_NEEDS_${_room}})
+  foreach(_module ${ARGN})
+    list(APPEND _wheelwright_needs ${WHEELWRIGHT_NEEDS_${_module}})
   endforeach()
   list(REMOVE_DUPLICATES _wheelwright_needs)
   if(_wheelwright_needs MATCHES "zstd|lz4|xxhash|sqlite3|hdf5")

@@ -5,8 +5,8 @@ include(CMakePackageConfigHelpers)
 set(WHEELWRIGHT_CMAKE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/Wheelwright)
 install(EXPORT WheelwrightTargets NAMESPACE Wheelwright:: DESTINATION ${WHEELWRIGHT_CMAKE_DIR}
   COMPONENT development)
-get_property(WHEELWRIGHT_INSTALLED_ROOMS GLOBAL PROPERTY WHEELWRIGHT_ROOMS)
-list(TRANSFORM WHEELWRIGHT_INSTALLED_ROOMS REPLACE "^wheelwright_" "")
+get_property(WHEELWRIGHT_INSTALLED_MODULES GLOBAL PROPERTY WHEELWRIGHT_MODULES)
+list(TRANSFORM WHEELWRIGHT_INSTALLED_MODULES REPLACE "^wheelwright_" "")
 configure_package_config_file(tools/cmake/WheelwrightConfig.cmake.in ${CMAKE_BINARY_DIR}/WheelwrightConfig.cmake
   INSTALL_DESTINATION ${WHEELWRIGHT_CMAKE_DIR})
 # Headers, with the includes that a program writes.

@@ -7,9 +7,9 @@ if(NOT PROJECT_IS_TOP_LEVEL OR NOT TARGET wheelwright)
 endif()
 
 # What `cmake --install` copies, and what the packages hold beside it; nothing of tests, examples and benchmarks.
-get_property(rooms GLOBAL PROPERTY WHEELWRIGHT_ROOMS)
+get_property(modules GLOBAL PROPERTY WHEELWRIGHT_MODULES)
 add_custom_target(installed)
-add_dependencies(installed wheelwright ${rooms})
+add_dependencies(installed wheelwright ${modules})
 add_custom_target(packaged)
 add_dependencies(packaged installed)
 if(TARGET wheelwright_shell_files)
@@ -67,8 +67,8 @@ if(Python3_Interpreter_FOUND)
   install(FILES ${papers}/sbom.cdx.json DESTINATION share/doc/wheelwright COMPONENT program EXCLUDE_FROM_ALL)
 endif()
 
-# What the installed CMake package asks for, as Debian packages: everything in tools/cmake/dependencies.json that is used by
-# the library.
+# What the installed CMake package asks for, as Debian packages: everything in tools/cmake/dependencies.json that is
+# used by the library.
 file(READ ${PROJECT_SOURCE_DIR}/tools/cmake/dependencies.json dependencies)
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tools/cmake/dependencies.json)
 string(JSON count LENGTH "${dependencies}" dependencies)
