@@ -5,7 +5,7 @@
     check_tidy.py [FOLDER...]    folders of this repository (bounds, logs, ...); without one all but
                                   tests and examples
 
-Checks, and why some are left out, stand in .clang-tidy. build/ has to be built: its unity sources are read, since most
+Checks, and why some are left out, stand in tools/clang-tidy.yaml. build/ has to be built: its unity sources are read, since most
 of the time goes into the headers of libraries, and these are then read once for twelve files. Exit code 1 where
 something is found, each told once. All of it takes two processors half an hour.
 """
@@ -44,8 +44,8 @@ def commands(folders):
 
 def findings(tidy, source, directory, options):
     """Their text by place; a file that does not compile is one."""
-    done = subprocess.run([tidy, "--quiet", CHECKS, f"--header-filter=^{re.escape(str(ROOT))}/", str(source),
-                           "--", *options], cwd=directory, capture_output=True, text=True, check=False)
+    done = subprocess.run([tidy, "--quiet", f"--config-file={ROOT}/tools/clang-tidy.yaml", CHECKS,
+                           f"--header-filter=^{re.escape(str(ROOT))}/", str(source), "--", *options], cwd=directory, capture_output=True, text=True, check=False)
     found, lines = {}, done.stdout.splitlines()
     for k, line in enumerate(lines):
         if FINDING.match(line):
