@@ -20,7 +20,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build-debug"
-MADE = ROOT / "build" / "report" / "embedded"  # headers that a source includes
+MADE = ROOT / "build" / "results" / "report" / "embedded"  # headers that a source includes
 OURS_TO_GCC = ("-Wno-subobject-linkage",)  # which clang does not know
 
 

@@ -20,6 +20,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import check_layers
 from check_alone import clang_options
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,8 +35,10 @@ def commands(folders):
     """(source, directory, options) of each object that is made of sources in these folders."""
     for entry in json.loads((BUILD / "compile_commands.json").read_text(encoding="utf-8")):
         source, command = Path(entry["file"]), shlex.split(entry["command"])
-        folder = source.relative_to(BUILD if BUILD in source.parents else ROOT).parts[0]
-        if (folder not in folders if folders else folder in LEFT_OUT) or "cmake_pch" in source.name:
+        name = source.relative_to(BUILD if BUILD in source.parents else ROOT).as_posix()
+        wanted = any(name.startswith(folder + "/") for folder in folders) if folders else (
+            check_layers.module_of(name) not in LEFT_OUT)
+        if not wanted or "cmake_pch" in source.name:
             continue
         options = [each for each in clang_options(command)
                    if each not in ("-include", "-Winvalid-pch", entry["file"]) and "cmake_pch" not in each]
@@ -45,7 +48,8 @@ def commands(folders):
 def findings(tidy, source, directory, options):
     """Their text by place; a file that does not compile is one."""
     done = subprocess.run([tidy, "--quiet", f"--config-file={ROOT}/tools/clang-tidy.yaml", CHECKS,
-                           f"--header-filter=^{re.escape(str(ROOT))}/", str(source), "--", *options], cwd=directory, capture_output=True, text=True, check=False)
+                           f"--header-filter=^{re.escape(str(ROOT))}/", str(source), "--", *options], cwd=directory,
+                          capture_output=True, text=True, check=False)
     found, lines = {}, done.stdout.splitlines()
     for k, line in enumerate(lines):
         if FINDING.match(line):

@@ -19,12 +19,11 @@ WHEELWRIGHT_VERSION=$(sed -n 's/^project(Wheelwright VERSION \([0-9.]*\).*/\1/p'
 WHEELWRIGHT_EXTRA=$site/source/extra
 export WHEELWRIGHT_VERSION WHEELWRIGHT_EXTRA
 
-modules='core model filter bounds detector files logs robots sim identify commission inference doctor design gap study'
-modules="$modules words results export report"
+folders='core model bounds identify detector commission gap study formats results'
 {
   cat docs/site/Doxyfile
   echo "PROJECT_NUMBER = $WHEELWRIGHT_VERSION"
-  echo "INPUT = $modules"
+  echo "INPUT = $folders"
   echo "OUTPUT_DIRECTORY = $site/source/extra"
   echo "GENERATE_TAGFILE = $site/tags.xml"
 } > "$site/Doxyfile"
