@@ -47,7 +47,7 @@ def python(*command, **environment):
 
 def page_code():
     """The code that docs/use/python.md shows before "Installing", and of it, apart, the lines that draw."""
-    page = (SOURCE / "docs" / "python.md").read_text()
+    page = (SOURCE / "docs/use/python.md").read_text()
     lines = "".join(re.search(r"((?:^ {4}.*\n|^\n)+)", page[page.index(first):], re.M).group(1)
                     for first in ("    import numpy", "    health = ")).splitlines(keepends=True)
     return tuple(textwrap.dedent("".join(line for line in lines if ("ww.plot." in line) == draws)) for draws in (False, True))

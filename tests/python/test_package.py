@@ -141,7 +141,7 @@ class Wheel(unittest.TestCase):
             self.assertIn("wheelwright/_core.pyi", names)
 
     def test_it_loads_libraries_of_the_system_only(self):
-        done = run(SOURCE / "tools" / "check_elf.py", self.wheel)
+        done = python(SOURCE / "tools" / "check_elf.py", self.wheel)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
     def test_it_works_where_it_is_installed(self):
