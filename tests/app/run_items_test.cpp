@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/common.hpp"
 #include "app/run_items.hpp"
+#include "app/common.hpp"
 
 #include <atomic>
 #include <filesystem>

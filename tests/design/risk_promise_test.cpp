@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Promises at a stated risk: what a plan promises against what commissioning and the detector over scales make of a log
 // that was driven along it.
-#include "commission/commission.hpp"
 #include "commission/design/risk_promise.hpp"
+#include "commission/commission.hpp"
 
 #include <cmath>
 #include <cstdint>
