@@ -58,7 +58,7 @@ int run(const Arguments& a) {
   Robot robot = read_robot(a.robot);
   const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::judged);
   logs::RecordedLog& log = *opened.log;
-  robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
+  robot = model::with_column_errors(opened.robot, logs::interpolation_errors(log.report()));
   report::CommissionContext context{report_context(a.common, log.report(), log)};
   std::ranges::copy(opened.remarks, std::back_inserter(context.warnings));
   Progress progress(a.common.quiet);

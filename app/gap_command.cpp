@@ -309,7 +309,7 @@ int run(const Arguments& a) {
       [&] { baseline = reference.empty() ? SoundLog{} : open_sound_log(reference, robot, each, WheelPose::hidden); });
   logs::RecordedLog& log = *opened.log;
   logs::RecordedLog* const healthy = baseline.log.get();
-  robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
+  robot = model::with_column_errors(opened.robot, logs::interpolation_errors(log.report()));
   report::ReportContext context = report_context(a.common, log.report(), log);
   for (const SoundLog* of : {&opened, &baseline}) {
     context.warnings.insert(context.warnings.end(), of->remarks.begin(), of->remarks.end());

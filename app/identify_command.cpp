@@ -64,7 +64,7 @@ int run(const Arguments& a) {
   Robot robot = read_robot(a.robot);
   const SoundLog opened = open_sound_log(a.logs, robot, a.common, WheelPose::hidden);
   logs::RecordedLog& log = *opened.log;
-  robot = model::with_column_errors(robot, logs::interpolation_errors(log.report()));
+  robot = model::with_column_errors(opened.robot, logs::interpolation_errors(log.report()));
   if (!for_kinematics_only(log, robot)) {
     try {
       logs::require_columns(log, robots::needed_columns(robot));

@@ -36,11 +36,12 @@ study::FleetLog log_of(const robots::FleetListRobot& robot, const std::vector<ro
     for (const auto& [name, column] : reading.reader.map) {
       options.map[name] = column;
     }
-    auto log = open_sound_log(paths, declared, std::move(options), reading.despite, WheelPose::judged).log;
-    logs::require_columns(*log, robots::needed_columns(declared));
-    Robot robot_with_errors = model::with_column_errors(declared, logs::interpolation_errors(log->report()));
-    const std::size_t met = log->report().rows_read;
-    return study::OpenedLog{std::move(log), std::move(robot_with_errors), met};
+    SoundLog opened = open_sound_log(paths, declared, std::move(options), reading.despite, WheelPose::judged);
+    logs::require_columns(*opened.log, robots::needed_columns(declared));
+    const logs::LogReport& report = opened.log->report();
+    Robot robot_with_errors = model::with_column_errors(opened.robot, logs::interpolation_errors(report));
+    const std::size_t met = report.rows_read;
+    return study::OpenedLog{std::move(opened.log), std::move(robot_with_errors), met};
   };
   return out;
 }

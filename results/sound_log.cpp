@@ -17,13 +17,14 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
                         const std::vector<std::string>& despite, WheelPose pose, std::size_t threads) {
   reader.only = robots::useful_columns(robot);
   SoundLog out;
+  out.robot = robot;
   out.log = logs::open_log(paths, reader);
   const doctor::LogHealth health =
       doctor::examine(read_all(*out.log, kExaminedRows), robot, reader_counts(out.log->report()), threads);
   std::string wrong;
   std::vector<std::string> names;
   for (const doctor::LogFinding& finding : health.findings) {
-    if (finding.severity != doctor::FindingSeverity::fatal || finding.topic != doctor::FindingTopic::units) {
+    if (!finding.is_refusal()) {
       continue;
     }
     if (std::ranges::count(despite, finding.id) > 0) {

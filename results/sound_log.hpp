@@ -24,14 +24,15 @@ enum class WheelPose {
   hidden,  ///< its columns are not read
 };
 
-/// A log whose units, signs and sides fit its robot.
+/// A log that is what its robot file says.
 struct SoundLog {
   std::unique_ptr<logs::RecordedLog> log;
+  Robot robot;                       ///< as declared, with what the log itself shows of its sensors
   std::vector<std::string> remarks;  ///< what was hidden and why, and what was passed over; one sentence each
 };
 
-/// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first kExaminedRows:
-/// where units, signs or sides cannot be right, InputError names the findings, and what to do. `despite` passes over
+/// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first kExaminedRows: for
+/// findings that refuse it (LogFinding::is_refusal()) InputError names them, and what to do. `despite` passes over
 /// findings by their names. Other fatal findings (nothing excited, a dead signal, efforts late) are left to the
 /// callers, which have an answer of their own to each. A log that lacks columns is not examined. Throws as open_log().
 [[nodiscard]] SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,

@@ -46,6 +46,12 @@ struct LogFinding {
   std::string unit{};                                       ///< of value, "1" for a share or a ratio
   std::vector<Interval> when{};  ///< stretches of the log, s of log time: the first kMostStretches
   std::size_t stretches = 0;     ///< how many there are altogether; 0: everywhere, or nowhere in particular
+  bool refuses = false;          ///< a fatal one: no command makes a model of the log, as for every fatal one of units
+
+  /// True if commands that make something of a log refuse it for this (results/sound_log.hpp).
+  [[nodiscard]] bool is_refusal() const {
+    return severity == FindingSeverity::fatal && (refuses || topic == FindingTopic::units);
+  }
 };
 
 /// Stretches that a finding lists at most.
