@@ -8,16 +8,18 @@
                                       the includes whose removal would lower the mean of MODULE most
     check_includes.py --self-test     plants each violation in a scratch tree and expects it to be found
 
-An include of a header of this repository is written <wheelwright/MODULE/x.hpp>, or in quotes from the root of the
-repository, from the folder of the file, or from tests/.
+An include of a header of this repository is written "MODULE/x.hpp" from its root, or <wheelwright/MODULE/x.hpp> where
+the library is used. Modules are those of tools/check_layers.py.
 """
 
-import os
 import re
 import sys
 import tempfile
 from collections import Counter, defaultdict
 from pathlib import Path
+
+import check_layers
+from check_layers import module_of
 
 # Most headers that one source may read, and the most that the sources of a module may read on average.
 MOST = 75
@@ -29,52 +31,40 @@ EXCEPTIONS = {
     "tests/report/page_test.cpp": (96, "makes every page"),
 }
 
-SKIP = re.compile(r"^(?:\.git|\.cache|build.*|node_modules|out|__pycache__)$")
-INCLUDE = re.compile(r'^\s*#\s*include\s*(<wheelwright/|")([^>"]+)[>"]', re.M)
+INCLUDE = re.compile(r'^\s*#\s*include\s*(?:<wheelwright/|")([^>"]+)[>"]', re.M)
 
 
-class Includes:
-    """The headers of this repository that each of its files includes."""
+def include_graph(files):
+    """file -> the headers of this repository that it includes itself, of {path: text}."""
+    return {file: [header for header in INCLUDE.findall(text) if header in files and header != file]
+            for file, text in files.items()}
 
-    def __init__(self, root):
-        texts = {}
-        for directory, names, leaves in os.walk(root):
-            names[:] = sorted(name for name in names if not SKIP.match(name))
-            for leaf in sorted(leaves):
-                path = Path(directory) / leaf
-                if path.suffix in (".hpp", ".cpp") and not path.is_symlink():
-                    texts[path.relative_to(root).as_posix()] = path.read_text(encoding="utf-8")
-        self.of = {file: self._headers(file, text, texts) for file, text in texts.items()}
-        self.sources = [file for file in self.of if file.endswith(".cpp")]
 
-    @staticmethod
-    def _headers(file, text, texts):
-        found = []
-        for kind, name in INCLUDE.findall(text):
-            places = [name]
-            if kind == '"':
-                places = [os.path.normpath(f"{Path(file).parent.as_posix()}/{name}"), name, f"tests/{name}"]
-            found += [place for place in places if place in texts and place != file][:1]
-        return found
+def read_graph(root):
+    """The include graph of the C++ files below `root`."""
+    return include_graph({path.relative_to(root).as_posix(): path.read_text(encoding="utf-8")
+                          for path in check_layers.files(root) if path.suffix in (".hpp", ".cpp")})
 
-    def reached(self, file, without=None):
-        """The headers that `file` reads, itself apart; `without` an include (from, to)."""
-        seen, ahead = set(), [file]
-        while ahead:
-            at = ahead.pop()
-            for header in self.of[at]:
-                if header not in seen and (at, header) != without:
-                    seen.add(header)
-                    ahead.append(header)
-        return seen - {file}
 
-    def by_module(self, without=None):
-        """module -> {source: number of headers that it reads}; what stands in the root has no module."""
-        numbers = defaultdict(dict)
-        for source in self.sources:
-            if "/" in source:
-                numbers[source.split("/")[0]][source] = len(self.reached(source, without))
-        return numbers
+def pulled_in(file, graph, without=None):
+    """The headers of this repository that are read where `file` is compiled; `without` an include (from, to)."""
+    seen, ahead = set(), [file]
+    while ahead:
+        at = ahead.pop()
+        for header in graph[at]:
+            if header not in seen and (at, header) != without:
+                seen.add(header)
+                ahead.append(header)
+    return seen - {file}
+
+
+def headers_by_module(graph):
+    """module -> {source: number of headers that it pulls in}; what stands in the root has no module."""
+    numbers = defaultdict(dict)
+    for file in graph:
+        if file.endswith(".cpp") and module_of(file):
+            numbers[module_of(file)][file] = len(pulled_in(file, graph))
+    return numbers
 
 
 def mean(numbers):
@@ -85,7 +75,7 @@ def check(root, most=MOST, on_average=None, exceptions=None):
     on_average = MOST_ON_AVERAGE if on_average is None else on_average
     exceptions = EXCEPTIONS if exceptions is None else exceptions
     findings = []
-    numbers = Includes(root).by_module()
+    numbers = headers_by_module(read_graph(root))
     known = {source: number for of in numbers.values() for source, number in of.items()}
     for source, number in sorted(known.items()):
         limit = exceptions.get(source, (most, ""))[0]
@@ -110,24 +100,25 @@ def check(root, most=MOST, on_average=None, exceptions=None):
 
 def table(root):
     lines = ["| module | sources | headers, mean | most | in |", "|---|---|---|---|---|"]
-    for module, numbers in sorted(Includes(root).by_module().items()):
+    for module, numbers in sorted(headers_by_module(read_graph(root)).items()):
         worst = max(numbers, key=numbers.get)
         lines.append(f"| {module} | {len(numbers)} | {mean(numbers):.1f} | {numbers[worst]} | {worst} |")
     return lines
 
 
 def edges(root, module, most=30):
-    includes = Includes(root)
-    if module not in includes.by_module():
-        sys.exit(f"check_includes: {module} has no sources: expected one of {', '.join(sorted(includes.by_module()))}")
-    sources = [source for source in includes.sources if source.startswith(module + "/")]
-    reached = {source: includes.reached(source) for source in sources}
+    graph = read_graph(root)
+    modules = headers_by_module(graph)
+    if module not in modules:
+        sys.exit(f"check_includes: {module} has no sources: expected one of {', '.join(sorted(modules))}")
+    sources = list(modules[module])
+    reached = {source: pulled_in(source, graph) for source in sources}
     gain = Counter()
     for at in set().union(*reached.values()) | set(sources):
-        for header in includes.of[at]:
+        for header in graph[at]:
             for source in sources:
                 if at == source or at in reached[source]:
-                    gain[at, header] += len(reached[source]) - len(includes.reached(source, (at, header)))
+                    gain[at, header] += len(reached[source]) - len(pulled_in(source, graph, (at, header)))
     return [f"{number / len(sources):6.2f}  {at} -> {header}" for (at, header), number in gain.most_common(most)]
 
 
@@ -137,12 +128,12 @@ def self_test():
         "core/a.hpp": "#include <vector>\n",
         "core/b.hpp": ours.format("a"),
         "core/sub/c.hpp": '#include "core/b.hpp"\n',
-        "core/b.cpp": ours.format("b") + '#include "sub/c.hpp"\n',
+        "core/b.cpp": ours.format("b") + '#include "core/sub/c.hpp"\n',
         "app/common.hpp": ours.format("a"),
-        "app/run.cpp": '#include "common.hpp"\n',
-        "app/other.cpp": '#include "app/common.hpp"\n#include "common.hpp"\n#include "made_by_the_build.hpp"\n',
+        "app/run.cpp": '#include "app/common.hpp"\n',
+        "app/other.cpp": '#include "app/common.hpp"\n#include "made_by_the_build.hpp"\n',
         "tests/support/help.hpp": "",
-        "tests/core/a_test.cpp": ours.format("a") + '#include "support/help.hpp"\n',
+        "tests/core/a_test.cpp": ours.format("a") + '#include "tests/support/help.hpp"\n',
     }
     limits = {"most": 3, "on_average": {"app": 2}, "exceptions": {}}
     planted = {

@@ -27,6 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 import check_layers  # noqa: E402
+from check_includes import headers_by_module, include_graph, pulled_in  # noqa: E402
 from check_layers import MODULES, WIDTH, module_of  # noqa: E402
 
 PAGE = "docs/inside/architecture.md"
@@ -81,36 +82,10 @@ def lines_of(files, modules):
     return sum(text.count("\n") for name, text in files.items() if module_of(name) in modules)
 
 
-def included(name, text, files):
-    """Own headers that the file includes itself: "x/y.hpp" from the root, <wheelwright/x/y.hpp> in examples."""
-    for header in re.findall(r'^\s*#\s*include\s*(?:<wheelwright/|")([^>"]+)[>"]', text, re.M):
-        if header in files:
-            yield header
-
-
-def include_graph(files):
-    return {name: list(included(name, text, files)) for name, text in files.items()}
-
-
-def pulled_in(name, graph):
-    """Own headers that are read where `name` is compiled."""
-    seen, ahead = set(), list(graph[name])
-    while ahead:
-        header = ahead.pop()
-        if header not in seen:
-            seen.add(header)
-            ahead += graph[header]
-    return seen
-
-
-def headers_by_module(graph):
+def most_headers(graph):
     """module -> (mean, most, the source with most) of the own headers that its sources pull in."""
-    counts = defaultdict(dict)
-    for name in graph:
-        if name.endswith(".cpp") and module_of(name) in PRODUCT:
-            counts[module_of(name)][name] = len(pulled_in(name, graph))
     return {module: (sum(own.values()) / len(own), max(own.values()), max(own, key=own.get))
-            for module, own in counts.items()}
+            for module, own in headers_by_module(graph).items() if module in PRODUCT}
 
 
 def arrows(graph):
@@ -205,7 +180,7 @@ def counts(root, names, files):
     product = [name for name in files if module_of(name) in PRODUCT]
     public, unused = installed(root, graph)
     models, effects = known_names(files)
-    headers = headers_by_module(graph)
+    headers = most_headers(graph)
     between, upwards = arrows(graph)
     outer, circles = folder_arrows(graph)
     numbers = [
@@ -277,7 +252,7 @@ def self_test():
     graph = include_graph(files)
     assert graph["tests/gap/t.cpp"] == ["tests/support/s.hpp"]
     assert pulled_in("app/c.cpp", graph) == {"app/own.hpp", "gap/b.hpp", "core/a.hpp"}
-    assert headers_by_module(graph) == {"app": (3, 3, "app/c.cpp"), "core": (0, 0, "core/up.cpp")}
+    assert most_headers(graph) == {"app": (3, 3, "app/c.cpp"), "core": (0, 0, "core/up.cpp")}
     assert arrows(graph) == ({("gap", "core"), ("app", "gap")}, set())
     graph = include_graph(files | {"core/up.cpp": '#include "gap/b.hpp"\n'})
     assert arrows(graph)[1] == {("core", "gap")}
@@ -322,7 +297,7 @@ def main():
             print(f"{lines_of(files, {module}):8,}  {module}: {len(own)} files, "
                   f"{len(public.get(module, ()))} headers for others")
     if arguments.headers:
-        for module, (mean, most, source) in headers_by_module(include_graph(files)).items():
+        for module, (mean, most, source) in most_headers(include_graph(files)).items():
             print(f"{mean:8.1f}  {module}: at most {most} ({source})")
     if arguments.twins:
         for (function, count), modules in sorted(twins_by_name(files).items()):
