@@ -11,6 +11,11 @@
 # its package registries (apt's and npm's configuration, certificates, proxy and certificate variables) is copied.
 # Further environment: SUITE (bookworm), MIRROR (http://deb.debian.org/debian).
 set -eu
+# What is mounted into DIRECTORY is gone with this process, however it ends: who removes DIRECTORY then removes nothing
+# of this machine.
+if [ "${FRESH_ROOT_ALONE:-}" != yes ]; then
+  exec unshare --mount --propagation private env FRESH_ROOT_ALONE=yes "$0" "$@"
+fi
 root=${1:?usage: tools/fresh_root.sh DIRECTORY [COMMAND...]}
 shift
 command=${*:-'./examples/commission.sh && ./tests/run.sh'}
@@ -36,20 +41,12 @@ for path in /etc/apt/sources.list /etc/apt/sources.list.d /etc/apt/apt.conf /etc
 done
 rm -f "$root"/etc/apt/apt.conf.d/docker-gzip-indexes
 
-mounted=''
-finish() {
-  for at in $mounted; do
-    umount "$at" || umount -l "$at"
-  done
-}
-trap finish EXIT
 for what in proc dev dev/pts; do
   if ! mountpoint -q "$root/$what"; then
     case $what in
       proc) mount -t proc proc "$root/proc" ;;
       *) mount --bind "/$what" "$root/$what" ;;
     esac
-    mounted="$root/$what $mounted"
   fi
 done
 
