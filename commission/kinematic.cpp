@@ -110,14 +110,16 @@ Frame settle(LogSource& log, const Robot& robot, const filter::OdometryMeasureme
                                           robot.noise.wheel_angle.value || robot.encoder_counts_per_turn);
   const bool heading = declared_motion && robot.noise.heading.value;
   const bool position = heading && robot.noise.position.value;
+  const bool gyro = declared_motion && m.gyro && robot.noise.gyro.value;
   for (const std::string& output : m.outputs()) {
-    s.is_declared.push_back(output == "yaw" ? heading : output == "gyro_yaw" ? false : position);
+    s.is_declared.push_back(output == "yaw" ? heading : output == "gyro_yaw" ? gyro : position);
   }
-  if (heading) {
+  if (heading || gyro) {
     const std::vector<double> limit = acceleration_limit(robot, survey, m.motion, *motion);
     s.declared.acceleration = limit.empty() ? 0.0 : *std::ranges::max_element(limit);
     s.declared.motion = *motion + between_samples(s.declared.acceleration, survey, m.motion);
-    s.declared.heading = *robot.noise.heading.value;
+    s.declared.heading = robot.noise.heading.value.value_or(0.0);
+    s.declared.gyro = gyro ? *robot.noise.gyro.value : 0.0;
     s.declared.position = robot.noise.position.value.value_or(0.0);
     s.declared.yaw_gain = (1.0 + options.radius_share) * gain;
   }

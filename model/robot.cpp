@@ -214,6 +214,8 @@ Robot with_column_errors(Robot robot, const std::vector<core::ColumnError>& erro
       widen(&SensorNoise::position);
     } else if (name == "theta") {
       widen(&SensorNoise::heading);
+    } else if (name == "gyro_z") {
+      widen(&SensorNoise::gyro);
     }
   }
   return robot;

@@ -66,6 +66,7 @@ struct SensorNoise {
   NoiseBound effort;       ///< unit of the effort
   NoiseBound position;     ///< m (pose, or the single axis's own position, m or rad)
   NoiseBound heading;      ///< rad
+  NoiseBound gyro;         ///< rad/s, of gyro_z
 };
 
 /// Filter constants of (24); what is not given is chosen from the data.
@@ -118,6 +119,8 @@ struct Robot {
   std::optional<double> encoder_counts_per_turn;
   SpeedSource speed_source = SpeedSource::automatic;
   PoseSource pose_source = PoseSource::automatic;
+  double heading_offset = 0.0;  ///< rad, counterclockwise from the logged heading to the driving direction; readers of
+                                ///< logs add it to `theta`
   std::map<std::string, double> limits;    ///< effort, speed, acceleration
   std::optional<double> kinematic_window;  ///< s, of the kinematic residual (odometry_filter.hpp)
   std::optional<Motor> motor;

@@ -155,6 +155,9 @@ std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, 
                         {"yaw_gain", m.errors.yaw_gain},
                         {"estimated", numbers(m.errors.estimated)}}},
                       {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
+  if (m.errors.gyro > 0.0) {
+    json["detector"]["error_bounds"]["gyro"] = m.errors.gyro;
+  }
   json["validation"] = validation_json(r, m.measurement, folds, m.window);
   if (m.at_risk) {
     json["at_risk"] = pose_risk_json(*m.at_risk, r.at_risk, m.measurement.parameters());

@@ -144,9 +144,11 @@ SetCheck check_kinematic(const KinematicClaims& claims, const Robot& robot, LogS
     }
   };
   for (std::size_t i = 0; i < claims.origin.size(); ++i) {
-    const bool taken = claims.origin[i] == core::NoiseOrigin::declared, yaw = claims.output_names[i] == "yaw";
+    const bool taken = claims.origin[i] == core::NoiseOrigin::declared;
+    const bool yaw = claims.output_names[i] == "yaw", gyro = claims.output_names[i] == "gyro_yaw";
     declared("heading", claims.errors.heading, robot.noise.heading, taken && yaw);
-    declared("position", claims.errors.position, robot.noise.position, taken && !yaw);
+    declared("gyro", claims.errors.gyro, robot.noise.gyro, taken && gyro);
+    declared("position", claims.errors.position, robot.noise.position, taken && !yaw && !gyro);
   }
   for (Eigen::Index i = 0; i < model.errors.estimated.size(); ++i) {
     if (model.errors.estimated[i] < claims.errors.estimated[i]) {

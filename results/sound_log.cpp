@@ -16,6 +16,7 @@ namespace wheelwright::results {
 SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot, logs::LogOptions reader,
                         const std::vector<std::string>& despite, WheelPose pose, std::size_t threads) {
   reader.only = robots::useful_columns(robot);
+  reader.heading_offset = robot.heading_offset;
   SoundLog out;
   out.robot = robot;
   out.log = logs::open_log(paths, reader);
@@ -42,18 +43,31 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
                     "--despite {} goes on all the same",
                     paths.front().string(), wrong, fmt::join(names, " --despite ")));
   }
+  bool again = false;
   const doctor::LogFinding* repeats = health.find("signals.pose_repeats_wheels");
   if (repeats != nullptr && pose == WheelPose::hidden) {
     std::erase_if(*reader.only,
                   [&](const std::string& name) { return std::ranges::count(repeats->columns, name) > 0; });
-    auto without_pose = logs::open_log(paths, reader);
+    out.remarks.push_back(fmt::format("{} It is not used.", repeats->sentence));
+    again = true;
+  }
+  if (const doctor::LogFinding* turned = health.find("units.heading_offset")) {
+    out.robot.heading_offset += turned->value;
+    if (std::optional<double>& heading = out.robot.noise.heading.value) {
+      *heading += turned->margin;
+    }
+    reader.heading_offset = out.robot.heading_offset;
+    out.remarks.push_back(fmt::format("{} {}", turned->sentence, turned->next));
+    again = true;
+  }
+  if (again) {
+    auto reopened = logs::open_log(paths, reader);
     for (std::size_t k = 0; k < paths.size(); ++k) {
-      if (without_pose->report().files[k].hash != out.log->report().files[k].hash) {
+      if (reopened->report().files[k].hash != out.log->report().files[k].hash) {
         throw InputError(paths[k].string() + ": was replaced while it was read: expected a log that is complete");
       }
     }
-    out.log = std::move(without_pose);
-    out.remarks.push_back(fmt::format("{} It is not used.", repeats->sentence));
+    out.log = std::move(reopened);
   }
   return out;
 }

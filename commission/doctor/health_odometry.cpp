@@ -159,6 +159,43 @@ Alignment alignment(const std::vector<Window>& windows, double scale) {
   return {weight > 0.0 ? std::abs(sum) / weight : 0.0, 0.5 * std::arg(sum)};
 }
 
+// Angle from the logged heading (scale·theta) to the direction in which the wheels drive, counterclockwise, with its
+// standard error: displacements in the frame of the heading are a complex multiple of what the wheels rolled, and a
+// point off the axle adds one of what the heading turned. Nothing where the wheels hardly roll.
+struct DrivingDirection {
+  double offset = 0.0, error = 0.0;
+};
+
+std::optional<DrivingDirection> driving_direction(const std::vector<Window>& windows, double scale) {
+  const auto n = static_cast<Eigen::Index>(windows.size());
+  if (windows.size() < kFewest) {
+    return std::nullopt;
+  }
+  Eigen::MatrixX2cd rolled(n, 2);
+  Eigen::VectorXcd moved(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Window& w = windows[static_cast<std::size_t>(i)];
+    // The chord of an arc is shorter than the arc, and turned by half of what the robot turned.
+    const double half = 0.5 * scale * w.heading;
+    rolled(i, 0) = w.along() * (std::abs(half) > 1e-6 ? std::sin(half) / half : 1.0);
+    rolled(i, 1) = std::complex<double>(0.0, 2.0 * std::sin(half));
+    moved[i] = std::polar(1.0, -scale * w.middle) * std::complex<double>(w.x, w.y);
+  }
+  const Eigen::Matrix2cd gram = rolled.adjoint() * rolled;
+  const double along = gram(0, 0).real(), turn = gram(1, 1).real();
+  if (!(along > 0.01 * turn) || !(along > 0.0)) {
+    return std::nullopt;
+  }
+  const Eigen::Matrix2cd inverse = (gram + 1e-9 * (along + turn) * Eigen::Matrix2cd::Identity()).inverse();
+  const Eigen::Vector2cd found = inverse * (rolled.adjoint() * moved);
+  const double rest = (moved - rolled * found).squaredNorm() / static_cast<double>(2 * n - 4);
+  const double radius = std::abs(found[0]);
+  if (!(radius > 0.0)) {
+    return std::nullopt;
+  }
+  return DrivingDirection{std::arg(found[0]), std::sqrt(rest * inverse(0, 0).real()) / radius};
+}
+
 // Scale that makes rad with the usual sign of the logged heading: 1, −1, or a degree. Degrees are believed only where
 // the heading changes faster than any wheeled robot turns.
 double heading_scale(const std::vector<Window>& windows) {
@@ -426,9 +463,7 @@ void check_pose_origin(const HealthView& view, std::vector<LogFinding>& out) {
   out.back().unit = origin.heading_repeats ? "rad" : "m";
 }
 
-}  // namespace
-
-void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
+void check_wheels_and_pose(const HealthView& view, std::vector<LogFinding>& findings) {
   check_angles(view, findings);
   const bool theta = view.column("theta") != nullptr, gyro = view.column("gyro_z") != nullptr;
   if (view.joints.size() != 2 || !view.has_motion() || (!theta && !gyro)) {
@@ -519,6 +554,48 @@ void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
                                 100.0 * yaw->explained),
                     "", {}, yaw->explained));
   }
+}
+
+constexpr double kTurnedHeading = 0.03;  // rad, from which on an offset is said and taken off
+constexpr double kOffsetErrors = 5.0;    // standard errors
+
+// The heading of a body that is not turned as the robot drives; nothing where there is none, or it cannot be told.
+std::optional<DrivingDirection> turned_heading(const HealthView& view, std::vector<LogFinding>& out) {
+  const std::vector<Window> windows = windows_of(view);
+  const double scale = heading_scale(windows);
+  const auto found = driving_direction(windows, scale);
+  if (!found || std::abs(scale) != 1.0 || alignment(windows, scale).quality < kAligned ||
+      std::abs(found->offset) < kTurnedHeading + kOffsetErrors * found->error) {
+    return std::nullopt;
+  }
+  LogFinding f = about_units(
+      "units.heading_offset", FindingSeverity::notice,
+      fmt::format("The robot drives {:.4g} ± {:.1g}° to the {} of theta: the heading is that of a body that is turned "
+                  "against the wheels.",
+                  std::abs(found->offset) / kDegree, 2.0 * found->error / kDegree,
+                  found->offset > 0.0 ? "left" : "right"),
+      fmt::format("It is taken off on reading; `heading_offset: {:.4f}` in the robot file settles it.", found->offset),
+      {"theta"}, found->offset);
+  f.unit = "rad";
+  f.margin = kOffsetErrors * found->error;
+  out.push_back(f);
+  return found;
+}
+
+}  // namespace
+
+void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
+  if (view.joints.size() == 2 && view.has_motion() && view.column("theta") != nullptr && view.column("x") != nullptr &&
+      view.column("y") != nullptr) {
+    if (const auto turned = turned_heading(view, findings)) {
+      LogTable straight = *view.log;
+      std::vector<double>& theta = straight.columns[*core::position_of(straight, "theta")];
+      std::ranges::for_each(theta, [&](double& heading) { heading += turned->offset; });
+      check_wheels_and_pose(make_view(straight, view.robot_given ? std::optional(view.robot) : std::nullopt), findings);
+      return;
+    }
+  }
+  check_wheels_and_pose(view, findings);
 }
 
 }  // namespace wheelwright::doctor

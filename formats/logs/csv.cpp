@@ -545,6 +545,7 @@ struct CsvRowParser::Impl {
   bool learning = false;
   std::size_t line_number = 1;
   double start = 0.0;
+  double heading_offset = 0.0;  ///< rad
 
   static constexpr std::size_t fewest_steps = 20;
   static constexpr std::size_t most_steps = 101;
@@ -574,6 +575,7 @@ CsvRowParser::CsvRowParser(std::string_view header, const CsvOptions& options, d
     header.remove_suffix(1);
   }
   impl_->header = read_csv_header(header, options, name + ":1");
+  impl_->heading_offset = options.heading_offset;
   impl_->names = names_of(impl_->header);
   impl_->rows = std::make_unique<CsvRowReader>(impl_->names, &impl_->report);
   impl_->rows->begin_file(impl_->header, std::move(name));
@@ -616,7 +618,7 @@ bool CsvRowParser::parse(std::string_view line, LogBlock& block) {
   block.t.assign(1, own.rows->t());
   block.columns.resize(own.names.size());
   for (std::size_t c = 0; c < own.names.size(); ++c) {
-    block.columns[c].assign(1, own.rows->values()[c]);
+    block.columns[c].assign(1, own.rows->values()[c] + (own.names[c] == "theta" ? own.heading_offset : 0.0));
   }
   block.segment_starts.clear();
   if (outcome == RowOutcome::new_segment) {

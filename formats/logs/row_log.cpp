@@ -232,6 +232,7 @@ RowLog::RowLog(std::vector<std::unique_ptr<RowFile>> files, RowLogOptions option
       names_.push_back(name);
     }
   }
+  theta_ = static_cast<std::size_t>(std::ranges::find(names_, "theta") - names_.begin());
   find_median_step();
   kept_ = std::make_shared<std::vector<LogBlock>>();
   survey();
@@ -288,6 +289,10 @@ void RowLog::survey() {
   }
 }
 
+double RowLog::value(const RowWalk& walk, std::size_t column) const {
+  return walk.values()[column] + (column == theta_ ? options_.heading_offset : 0.0);
+}
+
 void RowLog::keep(const RowWalk& walk, bool starts) {
   if (!kept_) {
     return;
@@ -308,7 +313,7 @@ void RowLog::keep(const RowWalk& walk, bool starts) {
   }
   block.t.push_back(walk.t());
   for (std::size_t c = 0; c < width; ++c) {
-    block.columns[c].push_back(walk.values()[c]);
+    block.columns[c].push_back(value(walk, c));
   }
 }
 
@@ -377,7 +382,7 @@ bool RowLog::next(LogBlock& block) {
     }
     block.t[count] = walk_->t();
     for (std::size_t c = 0; c < width; ++c) {
-      block.columns[c][count] = walk_->values()[c];
+      block.columns[c][count] = value(*walk_, c);
     }
     ++count;
   }

@@ -145,6 +145,7 @@ struct RowLogOptions {
   std::size_t min_rows = 20;      ///< usable rows that a log must have
   /// Rows are kept in memory where they need no more than this; those of a longer log are read anew by every walk.
   std::size_t kept_bytes = std::size_t{1} << 28;
+  double heading_offset = 0.0;  ///< rad, added to `theta`
 };
 
 /// A log over files, each of which begins a new segment. Memory does not grow with them beyond
@@ -169,11 +170,13 @@ class RowLog : public RecordedLog {
   void find_median_step();
   void survey();
   void keep(const RowWalk& walk, bool starts);
+  [[nodiscard]] double value(const RowWalk& walk, std::size_t column) const;
   void judge() const;
   [[nodiscard]] double longest_step() const;
 
   std::vector<std::unique_ptr<RowFile>> files_;
   std::vector<std::string> names_;
+  std::size_t theta_ = 0;  ///< index of the heading, the number of names where there is none
   RowLogOptions options_;
   LogReport report_;
   std::size_t file_ = 0;

@@ -332,6 +332,7 @@ std::optional<detector::KinematicModel> kinematic_from_json(const JsonPlace& pla
   model.errors.motion = bound_at(errors.at("motion"));
   model.errors.position = bound_at(errors.at("position"));
   model.errors.heading = bound_at(errors.at("heading"));
+  model.errors.gyro = errors.has("gyro") ? bound_at(errors.at("gyro")) : 0.0;
   model.errors.acceleration = bound_at(errors.at("acceleration"));
   model.errors.yaw_gain = bound_at(errors.at("yaw_gain"));
   model.errors.estimated = bounds_at(errors.at("estimated"), n);

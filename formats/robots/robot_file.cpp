@@ -51,17 +51,17 @@ struct RobotReader {
   static bool drive(const Robot& robot) { return robot.model == "differential_drive"; }
 
   void read() {
-    const auto members = root.members({"name",         "model",
-                                       "wheel_radius", "track_width",
-                                       "footprint",    "lever_arm",
-                                       "friction",     "parameters",
-                                       "effort",       "nominal",
-                                       "prior",        "noise",
-                                       "filter",       "encoder_counts_per_turn",
-                                       "speed_source", "pose_source",
-                                       "limits",       "kinematic",
-                                       "motor",        "effects",
-                                       "columns"});
+    const auto members = root.members({"name",           "model",
+                                       "wheel_radius",   "track_width",
+                                       "footprint",      "lever_arm",
+                                       "friction",       "parameters",
+                                       "effort",         "nominal",
+                                       "prior",          "noise",
+                                       "filter",         "encoder_counts_per_turn",
+                                       "speed_source",   "pose_source",
+                                       "heading_offset", "limits",
+                                       "kinematic",      "motor",
+                                       "effects",        "columns"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }
@@ -210,6 +210,9 @@ struct RobotReader {
       robot.speed_source = static_cast<model::SpeedSource>(place.choice({"auto", "encoder_difference", "measured"}));
     } else if (key == "pose_source") {
       robot.pose_source = static_cast<model::PoseSource>(place.choice({"auto", "independent"}));
+    } else if (key == "heading_offset") {
+      robot.heading_offset =
+          place.number("an angle in rad, between -3.2 and 3.2", [](double value) { return std::abs(value) <= 3.2; });
     }
   }
 
@@ -238,12 +241,14 @@ struct RobotReader {
       place.demand("estimate");
       return;
     }
-    for (const auto& [name, value] : place.members({"wheel_speed", "wheel_angle", "effort", "position", "heading"})) {
+    for (const auto& [name, value] :
+         place.members({"wheel_speed", "wheel_angle", "effort", "position", "heading", "gyro"})) {
       model::NoiseBound& bound = name == "wheel_speed"   ? robot.noise.wheel_speed
                                  : name == "wheel_angle" ? robot.noise.wheel_angle
                                  : name == "effort"      ? robot.noise.effort
                                  : name == "position"    ? robot.noise.position
-                                                         : robot.noise.heading;
+                                 : name == "heading"     ? robot.noise.heading
+                                                         : robot.noise.gyro;
       if (value.is_mapping()) {
         read_error_class(value, bound);
       } else if (!(value.is_scalar() && value.text() == "estimate")) {
@@ -373,11 +378,15 @@ Json noise_bound(const model::NoiseBound& bound) {
 }
 
 Json noise_of(const model::SensorNoise& noise) {
-  return {{"wheel_speed", noise_bound(noise.wheel_speed)},
-          {"wheel_angle", noise_bound(noise.wheel_angle)},
-          {"effort", noise_bound(noise.effort)},
-          {"position", noise_bound(noise.position)},
-          {"heading", noise_bound(noise.heading)}};
+  Json out = {{"wheel_speed", noise_bound(noise.wheel_speed)},
+              {"wheel_angle", noise_bound(noise.wheel_angle)},
+              {"effort", noise_bound(noise.effort)},
+              {"position", noise_bound(noise.position)},
+              {"heading", noise_bound(noise.heading)}};
+  if (noise.gyro.value) {
+    out["gyro"] = noise_bound(noise.gyro);
+  }
+  return out;
 }
 
 Json filter_of(const model::FilterWish& filter) {
@@ -459,6 +468,9 @@ Json to_json(const Robot& robot) {
   out["speed_source"] = sources[static_cast<std::size_t>(robot.speed_source)];
   if (robot.pose_source == model::PoseSource::independent) {
     out["pose_source"] = "independent";
+  }
+  if (robot.heading_offset != 0.0) {
+    out["heading_offset"] = robot.heading_offset;
   }
   for (const auto& [name, value] : robot.limits) {
     out["limits"][name] = value;

@@ -27,9 +27,10 @@ namespace wheelwright::robots {
 ///     friction: isotropic | anisotropic, parameters: [physical names], effort: {kind: torque | current | voltage,
 ///     hold: zero_order | first_order, unsigned: bool, changes: between | at_samples, delay: s | [lo, hi]},
 ///     nominal: {physical name: value}, prior: {physical name: [lo, hi]},
-///     noise: estimate | {wheel_speed, wheel_angle, effort, position, heading: bound | estimate},
+///     noise: estimate | {wheel_speed, wheel_angle, effort, position, heading, gyro: bound | estimate},
 ///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto |
-///     encoder_difference | measured, pose_source: auto | independent, limits: {effort, speed, acceleration},
+///     encoder_difference | measured, pose_source: auto | independent, heading_offset: rad,
+///     limits: {effort, speed, acceleration},
 ///     motor: {torque_constant, resistance, back_emf, gear_ratio},
 ///     effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp),
 ///     columns: {name: column}, which read_columns() hands out

@@ -36,6 +36,7 @@ namespace wheelwright::filter {
 ///
 /// Bounds, all for the worst case:
 /// - dy, position: 2 n_p (|cos θ_k0| + |sin θ_k0|), at most 2√2 n_p. dy, yaw: 2 n_θ.
+/// - dy, gyro: n_g (t_k − t_k0) + Σ h² cA/2, the trapezoidal rule's error for |θ̈| <= 2cA.
 /// - dY, yaw and gyro: 2 n_φ, or n_ω (t_k − t_k0) for speeds.
 /// - dY, position, each wheel: half the sum of
 ///     n_φ (|E_first| + |E_last| + Σ|E_j − E_j−1|)   summation by parts (speeds: n_ω (t_k − t_k0)),
@@ -96,6 +97,7 @@ class OdometryFilter {
     std::array<double, 2> mean{};  // E_j of the step that ends here
     Sum variation;                 // Σ |E_j − E_j−1|
     Sum gyro;                      // ∫ gyro dt
+    Sum squared_steps;             // h² of each sample's step, s²
     std::array<Wheel, 2> wheels;
     std::size_t steps = 0;
   };

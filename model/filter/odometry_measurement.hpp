@@ -43,6 +43,7 @@ struct OdometryErrors {
   double motion = 0.0;        ///< n_φ (rad) for angles and mean speeds, n_ω (rad/s) for speeds
   double position = 0.0;      ///< n_p of x and of y, m
   double heading = 0.0;       ///< n_θ, rad
+  double gyro = 0.0;          ///< n_g of gyro_z, its bias apart, rad/s
   double acceleration = 0.0;  ///< |ω̇| of each wheel between samples is at most this, rad/s²
   double yaw_gain = 0.0;      ///< both yaw gains are at most this: |θ̈| <= 2·yaw_gain·acceleration
   /// For each output, or empty: a value > 0 is ē, which holds everything that the row may be wrong by and stands in the

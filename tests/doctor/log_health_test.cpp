@@ -412,6 +412,22 @@ TEST_F(LogHealthTest, PoseInOtherUnits) {
   expect("units.gyro", kFatal);
 }
 
+TEST_F(LogHealthTest, AHeadingOfABodyThatIsTurnedAgainstTheWheels) {
+  EXPECT_EQ(examine(log, robot).find("units.heading_offset"), nullptr);
+  const LogTable straight = log;
+  for (const double offset : {-3.0, -1.6, -0.7, -0.05, 0.05, 0.3, 0.7, 1.6, 3.14}) {
+    for (const bool with_robot : {true, false}) {
+      SCOPED_TRACE(offset);
+      log = straight;
+      std::ranges::for_each(log.column("theta"), [&](double& heading) { heading -= offset; });
+      const LogFinding found = expect("units.heading_offset", kNotice, with_robot);
+      EXPECT_LE(std::abs(std::remainder(found.value - offset, 2.0 * std::numbers::pi)), found.margin + 0.002);
+      EXPECT_LT(found.margin, 0.02);
+      EXPECT_EQ(told(examine(log, robot), kFatal), "");
+    }
+  }
+}
+
 TEST_F(LogHealthTest, GeometryThatDoesNotFit) {
   Robot diameter = robot;
   diameter.wheel_radius *= 2.0;

@@ -349,6 +349,45 @@ TEST(OdometryFilter, DoesNotDriftOverALongLog) {
   EXPECT_LT(most, 2e-10);  // what the sample's own times, angles and headings of 10⁴ to 10⁵ can hold
 }
 
+// Wheels in closed form, φ = a sin(ωt): the gyro samples what they make, wrong by up to its bound and steadily biased.
+TEST(OdometryFilter, ADeclaredGyroIsBoundedAtEveryRate) {
+  for (const double rate : {10.0, 50.0, 500.0}) {
+    for (const double uneven : {0.0, 0.4}) {
+      SCOPED_TRACE(std::to_string(rate) + " Hz, uneven by " + std::to_string(uneven));
+      Random random(static_cast<unsigned>(rate) + (uneven > 0.0 ? 1U : 0U));
+      OdometryMeasurement m = all_outputs();
+      m.position = m.heading = false;
+      m.nominal_step = 1.0 / rate;
+      const Eigen::Vector3d truth = kTruth.tail(3);
+      const double fast = 2.0, slow = 1.3, reach = 3.0;  // rad/s, rad/s, rad
+      OdometryErrors errors;
+      errors.gyro = 0.02;
+      errors.acceleration = reach * fast * fast;
+      errors.yaw_gain = std::max(truth[0], truth[1]);
+      OdometryFilter filter(m, 1.0, errors);
+      std::size_t rows = 0;
+      double used = 0.0;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(20.0 * rate); ++k) {
+        const double t = (static_cast<double>(k) + uneven * random.uniform(-0.5, 0.5)) / rate;
+        const double right = reach * std::sin(fast * t), left = reach * std::cos(slow * t);
+        const double turning =
+            truth[0] * reach * fast * std::cos(fast * t) + truth[1] * reach * slow * std::sin(slow * t);
+        const std::array sample{right, left,
+                                turning + truth[2] + errors.gyro * (random.uniform(0.0, 1.0) < 0.9 ? 1.0 : -1.0)};
+        if (filter.step(t, sample)) {
+          const FilteredRow& row = filter.row();
+          const double off = std::abs(row.y[0] - row.Y.row(0).dot(truth));
+          EXPECT_LE(off, row.dy[0] + row.dY.row(0).dot(truth.cwiseAbs()));
+          used = std::max(used, off / row.dy[0]);
+          ++rows;
+        }
+      }
+      EXPECT_GT(rows, static_cast<std::size_t>(15.0 * rate));
+      EXPECT_GT(used, 0.3);  // the bound is not idle
+    }
+  }
+}
+
 TEST(OdometryFilter, MeanSpeedsAreIntegratedBackToAngles) {
   const LogTable truth = arcs(402, varied);
   LogTable log;
