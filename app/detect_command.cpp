@@ -150,6 +150,7 @@ int run(const Arguments& a) {
   Detector detector = make_detector(model, a.detector);
   logs::LogOptions reader = reader_options(a.common);
   reader.only = robots::useful_columns(model.robot);
+  reader.clock = model.robot.clock;
   if (a.follow) {
     return follow_input(a, model, std::move(detector), reader);
   }

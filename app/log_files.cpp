@@ -33,6 +33,7 @@ logs::LogOptions reader_options(const CommonOptions& options) {
 logs::LogOptions robot_reader(const Robot& robot, const CommonOptions& options) {
   logs::LogOptions reader = reader_options(options);
   reader.only = robots::useful_columns(robot);
+  reader.clock = robot.clock;
   return reader;
 }
 

@@ -69,6 +69,7 @@ constexpr std::size_t kMessages = 200000;  // that are looked at for a robot des
 constexpr double kStartRadius = 0.1;       // m, where a search for the geometry begins
 constexpr double kStartTrack = 0.4;        // m
 constexpr double kHalfAStep = 0.25;        // of a step, about half a one
+constexpr const char* kDelayKey = "effort.delay";
 
 /// The text on a topic .../robot_description (std_msgs/String) of a recording; empty where there is none.
 std::string description_in(const std::vector<std::filesystem::path>& paths, const CommonOptions& common) {
@@ -221,7 +222,14 @@ void settle_from_log(const Arguments& a, RobotWithOrigins& made) {
     } else if (robot.hold == Hold::zero_order && std::abs(steps - 0.5) < kHalfAStep) {
       robot.hold = Hold::first_order;
       made.origins["effort.hold"] = "efforts come half a step after the motion if they are held: they are measured";
+    } else if (delay->taken) {
+      robot.effort_delay = *delay->taken;
+      made.origins["effort.delay"] = fmt::format("0 to {:g} s: {}", delay->taken->upper, delay->sentence);
     }
+  }
+  if (health.clock) {
+    robot.clock = health.clock;
+    made.origins["clock"] = health.find("time.even_clock")->sentence;
   }
   if (const doctor::LogFinding* encoder = health.find("signals.encoder");
       encoder != nullptr && !robot.encoder_counts_per_turn) {
@@ -354,9 +362,10 @@ int run(const Arguments& given) {
     }
     robot = made.robot;
     yaml = robots::robot_yaml(made) + robots::columns_yaml(a.common.columns);
-    for (const char* key :
-         {"wheel_radius", "track_width", "nominal.mass", "effort.kind", "effort.hold", "encoder_counts_per_turn"}) {
-      if (const auto origin = made.origins.find(key); origin != made.origins.end()) {
+    for (const char* key : {"wheel_radius", "track_width", "nominal.mass", "effort.kind", "effort.hold", "effort.delay",
+                            "clock", "encoder_counts_per_turn"}) {
+      if (const auto origin = made.origins.find(key);
+          origin != made.origins.end() && (key != std::string_view(kDelayKey) || robot.effort_delay != Interval{})) {
         took.push_back(fmt::format("{}: {}", key, origin->second));
       }
     }

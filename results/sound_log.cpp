@@ -16,6 +16,7 @@ namespace wheelwright::results {
 SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot, logs::LogOptions reader,
                         const std::vector<std::string>& despite, WheelPose pose, std::size_t threads) {
   reader.only = robots::useful_columns(robot);
+  reader.clock = robot.clock;
   SoundLog out;
   out.robot = robot;
   out.log = logs::open_log(paths, reader);
@@ -54,6 +55,17 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
     }
     out.log = std::move(without_pose);
     out.remarks.push_back(fmt::format("{} It is not used.", repeats->sentence));
+  }
+  if (const doctor::LogFinding* late = health.find("time.effort_delay");
+      late != nullptr && late->taken && pose == WheelPose::judged) {
+    out.robot.effort_delay = *late->taken;
+    out.robot.effort_delay_found = true;
+    out.remarks.push_back(late->sentence);
+  }
+  if (health.clock) {
+    out.log = logs::read_evenly(std::move(out.log), *health.clock);
+    out.robot.clock = health.clock;
+    out.remarks.push_back(health.find("time.even_clock")->sentence);
   }
   return out;
 }
