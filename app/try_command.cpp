@@ -69,7 +69,6 @@ constexpr std::size_t kMessages = 200000;  // that are looked at for a robot des
 constexpr double kStartRadius = 0.1;       // m, where a search for the geometry begins
 constexpr double kStartTrack = 0.4;        // m
 constexpr double kHalfAStep = 0.25;        // of a step, about half a one
-constexpr const char* kDelayKey = "effort.delay";
 
 /// The text on a topic .../robot_description (std_msgs/String) of a recording; empty where there is none.
 std::string description_in(const std::vector<std::filesystem::path>& paths, const CommonOptions& common) {
@@ -365,7 +364,8 @@ int run(const Arguments& given) {
     for (const char* key : {"wheel_radius", "track_width", "nominal.mass", "effort.kind", "effort.hold", "effort.delay",
                             "clock", "encoder_counts_per_turn"}) {
       if (const auto origin = made.origins.find(key);
-          origin != made.origins.end() && (key != std::string_view(kDelayKey) || robot.effort_delay != Interval{})) {
+          origin != made.origins.end() &&
+          (std::string_view(key) != "effort.delay" || robot.effort_delay != Interval{})) {
         took.push_back(fmt::format("{}: {}", key, origin->second));
       }
     }
