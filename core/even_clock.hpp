@@ -14,16 +14,7 @@
 
 namespace wheelwright::core {
 
-/// A sensor that takes sample k of a segment at φ + k·step, whatever its stamp says. Where the times of a segment begin
-/// does not matter to an equation of motion; their rate does.
-struct EvenClock {
-  double step = 0.0;   ///< s; 0: the stamps are the times of the samples
-  double drift = 0.0;  ///< bound of |true step/step − 1|, which changes slowly against a filter's memory
-
-  friend bool operator==(const EvenClock& a, const EvenClock& b) = default;
-};
-
-/// Times of samples by an EvenClock, from stamps as they come: what a detector does on line is what is done with a file.
+/// Times of samples by an EvenClock, from stamps as they come, on line as from a file.
 ///
 /// The phase is the running mean of the stamps. A stamp within 0.3 steps of the place next to the last one belongs
 /// there. Where it does not, the rows are kept until a later stamp tells: n rows on n free places have come late (they
@@ -92,7 +83,3 @@ class EvenSource final : public LogSource {
 [[nodiscard]] LogTable read_evenly(const LogTable& table, const EvenClock& clock);
 
 }  // namespace wheelwright::core
-
-namespace wheelwright {
-using core::EvenClock;
-}  // namespace wheelwright

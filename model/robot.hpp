@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "core/even_clock.hpp"
 #include "core/interval.hpp"
 #include "core/log.hpp"
 #include "model/model.hpp"

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "commission/doctor/log_health.hpp"
+#include "core/even_clock.hpp"
 #include "core/limits.hpp"
 #include "core/statistics.hpp"
 

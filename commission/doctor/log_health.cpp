@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/check.hpp"
+#include "core/even_clock.hpp"
 #include "core/for_all.hpp"
 #include "core/statistics.hpp"
 #include "core/words.hpp"

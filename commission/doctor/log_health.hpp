@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/even_clock.hpp"
 #include "core/interval.hpp"
 #include "core/log.hpp"
 #include "model/robot.hpp"
@@ -102,11 +101,11 @@ struct LogHealth {
 /// excitation is judged; without it, scales of units cannot be judged against radius, track and mass.
 ///
 /// Where stamps scatter about an even clock and the motion shows that the samples do not, everything is looked at by
-/// that clock (LogHealth::clock). The checks and their thresholds are in docs/use/doctor.md. Excitation is that of the filtered regressor (25) as
-/// commission_robot() makes it: settle(), fit_log() and identifiability(); the delay between effort and motion is that
-/// of TimeShiftedRows with its standard error. Throws nothing for what a log may hold; InvalidArgument for a robot that
-/// makes no sense, a log whose columns differ in length, or segments that do not ascend over its rows. The result does
-/// not depend on `threads`.
+/// that clock (LogHealth::clock). The checks and their thresholds are in docs/use/doctor.md. Excitation is that of the
+/// filtered regressor (25) as commission_robot() makes it: settle(), fit_log() and identifiability(); the delay between
+/// effort and motion is that of TimeShiftedRows with its standard error. Throws nothing for what a log may hold;
+/// InvalidArgument for a robot that makes no sense, a log whose columns differ in length, or segments that do not
+/// ascend over its rows. The result does not depend on `threads`.
 [[nodiscard]] LogHealth examine(const LogTable& log, const std::optional<Robot>& robot = std::nullopt,
                                 const ReaderCounts& reader = {}, std::size_t threads = 1);
 
@@ -152,7 +151,7 @@ struct HealthView {
 /// Puts the stretches of rows that `flagged` marks into `finding`; marks less than `join` s apart are one stretch.
 void set_stretches(LogFinding& finding, const HealthView& view, const std::vector<bool>& flagged, double join);
 
-/// Rows that come in bursts; stamps that scatter about an even clock. Returns that clock where the motion shows that the
+/// Rows that come in bursts; stamps that scatter about an even clock. Returns that clock where motion shows that the
 /// samples are even, and the robot does not say how the log is to be read.
 [[nodiscard]] std::optional<EvenClock> check_clock(const HealthView& view, std::vector<LogFinding>& findings);
 /// Rates, jitter, what is missing between rows, stamps that are too coarse, length.

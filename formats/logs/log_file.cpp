@@ -13,6 +13,7 @@
 
 #include "core/check.hpp"
 #include "core/error.hpp"
+#include "core/even_clock.hpp"
 #include "formats/logs/bag.hpp"
 #include "formats/logs/bag_log.hpp"
 #include "formats/logs/csv.hpp"

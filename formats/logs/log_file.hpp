@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "core/even_clock.hpp"
 #include "core/log.hpp"
 #include "formats/logs/csv_format.hpp"
 #include "formats/logs/mcap_format.hpp"
