@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "core/check.hpp"
 
@@ -37,13 +38,13 @@ void EvenTimes::begin(double stamp) {
   places_.push_back({.t = stamp, .starts = true});
 }
 
-void EvenTimes::put(double stamp, double index) {
+void EvenTimes::put(double stamp, double index, bool starts) {
   const double off = place_of(stamp) - index;
   ++seen_;
   phase_ += std::clamp(off, -0.5, 0.5) / static_cast<double>(std::min(seen_, kMemory));
   index_ = index;
   last_ = anchor_ + index * clock_.step;
-  places_.push_back({.t = last_, .starts = false, .off = off});
+  places_.push_back({.t = last_, .starts = starts, .off = off});
 }
 
 void EvenTimes::take(double stamp, bool starts) {
@@ -57,29 +58,37 @@ void EvenTimes::take(double stamp, bool starts) {
 }
 
 void EvenTimes::settle() {
-  const auto sure = [&](double stamp) { return std::abs(place_of(stamp) - std::round(place_of(stamp))) <= kSure; };
-  const double newest = std::round(place_of(kept_.back()));
-  const bool full = newest - index_ == static_cast<double>(kept_.size()) && sure(kept_.back());
-  bool told = full;
-  if (!told && kept_.size() > 1) {
-    double before = index_;
-    told = newest - std::round(place_of(*(kept_.end() - 2))) == 1.0 && std::ranges::all_of(kept_, [&](double stamp) {
-             const double place = std::round(place_of(stamp));
-             return sure(stamp) && place > std::exchange(before, place);
-           });
+  const std::size_t n = kept_.size();
+  // Places next to the stamps, but each before that of the row after it; those that a stamp and its neighbours agree on.
+  std::vector<double> places(n);
+  std::vector<bool> agreed(n);
+  for (std::size_t k = n; k-- > 0;) {
+    const double at = place_of(kept_[k]), near = std::round(at);
+    places[k] = k + 1 < n ? std::min(near, places[k + 1] - 1.0) : near;
+    agreed[k] = std::abs(at - near) <= kSure && places[k] == near;
   }
-  if (!told) {
-    if (kept_.size() >= (seen_ < kPhaseKnown ? kFirstKept : kMostKept)) {
+  const bool full = agreed.back() && places.back() - index_ == static_cast<double>(n);
+  const bool beside = n > 1 && agreed[n - 1] && agreed[n - 2] && places[n - 1] - places[n - 2] == 1.0;
+  if (!full && (!beside || places.front() <= index_)) {
+    if (n >= (seen_ < kPhaseKnown ? kFirstKept : kMostKept)) {
       give_up();
     }
     return;
   }
-  std::vector<double> indices;  // before the phase moves
-  for (const double stamp : kept_) {
-    indices.push_back(full ? index_ + static_cast<double>(indices.size() + 1) : std::round(place_of(stamp)));
+  for (std::size_t k = 0; full && k < n; ++k) {
+    places[k] = index_ + static_cast<double>(k + 1);
+    agreed[k] = true;
   }
-  for (std::size_t k = 0; k < kept_.size(); ++k) {
-    put(kept_[k], indices[k]);
+  for (std::size_t k = 0, next = 0; k < n; k = next + 1) {
+    next = k;
+    while (!agreed[next]) {
+      ++next;
+    }
+    // As many rows as places up to the next agreed one, or nobody knows which.
+    const bool all = places[next] - index_ == static_cast<double>(next - k + 1);
+    for (std::size_t i = k; i <= next; ++i) {
+      put(kept_[i], places[i], !all && next > k);
+    }
   }
   kept_.clear();
 }

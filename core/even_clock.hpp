@@ -17,9 +17,10 @@ namespace wheelwright::core {
 /// Times of samples by an EvenClock, from stamps as they come, on line as from a file.
 ///
 /// The phase is the running mean of the stamps. A stamp within 0.3 steps of the place next to the last one belongs
-/// there. Where it does not, the rows are kept until a later stamp tells: n rows on n free places have come late (they
-/// queued), and rows near places of their own, the last two beside each other, tell that rows between were lost. Where
-/// 32 rows tell nothing (8 at the beginning of a segment), each of them begins a segment, and the clock begins anew.
+/// there. Where it does not, rows are kept until later ones tell: n rows on n free places have come late (they queued);
+/// two rows beside each other, both near their places, tell that rows were lost before them. Rows of which that leaves
+/// open on which places they are begin a segment, as does the row after them. Where 32 rows tell nothing (8 at the
+/// beginning of a segment), each of them begins a segment, and the clock begins anew.
 class EvenTimes {
  public:
   /// Throws InvalidArgument unless the step is > 0 and the drift inside [0, 0.1).
@@ -45,7 +46,7 @@ class EvenTimes {
   [[nodiscard]] double place_of(double stamp) const { return (stamp - anchor_) / clock_.step - phase_; }
   void begin(double stamp);
   void settle();
-  void put(double stamp, double index);
+  void put(double stamp, double index, bool starts);
   void give_up();
 
   EvenClock clock_;
