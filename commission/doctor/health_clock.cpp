@@ -9,7 +9,6 @@
 
 #include "commission/doctor/log_health.hpp"
 #include "core/even_clock.hpp"
-#include "core/limits.hpp"
 #include "core/statistics.hpp"
 
 namespace wheelwright::doctor {
@@ -19,10 +18,8 @@ constexpr std::size_t kFewestRows = 200;
 constexpr double kScatters = 2e-4;      // of a step, standard deviation: stamps of less are even
 constexpr double kMuchScatter = 0.05;   // the same, above which it is said that nothing can be told
 constexpr double kMostUnplaced = 0.02;  // share of rows that find no place
-constexpr std::size_t kFarApart = 20;   // rows
-constexpr double kWanders = 3.0;        // variance over kFarApart rows by that over one: 1 of a grid, 20 of a walk
 constexpr double kSure = 6.0;           // standard errors
-constexpr double kMostMoved = 0.05;     // share of the scatter that even samples may show
+constexpr double kMostMoved = 0.01;     // share of the scatter that even samples may show
 constexpr double kTold = 0.15;          // standard error of that share, above which nothing is told
 constexpr std::size_t kBlock = 20;      // rows whose errors may depend on each other
 constexpr std::size_t kRateRows = 500;  // of a stretch by which the rate is known
@@ -149,31 +146,14 @@ double drift_of(const HealthView& view, const Grid& grid) {
   return drift;
 }
 
-// Scatter of the stamps about their places: standard deviation in steps, and whether it wanders.
-struct Scatter {
-  double deviation = 0.0, wander = 0.0;
-};
-
-Scatter scatter_of(const Grid& grid) {
-  double squares = 0.0, near = 0.0, far = 0.0, rows = 0.0, nears = 0.0, fars = 0.0;
-  each_stretch(grid, [&](std::size_t first, std::size_t last) {
-    for (std::size_t k = first + 1; k < last; ++k) {
-      squares += grid.off[k] * grid.off[k];
-      rows += 1.0;
-      if (k > first + 1) {
-        near += std::pow(grid.off[k] - grid.off[k - 1], 2.0);
-        nears += 1.0;
-      }
-      if (k > first + kFarApart) {
-        far += std::pow(grid.off[k] - grid.off[k - kFarApart], 2.0);
-        fars += 1.0;
-      }
-    }
-  });
-  Scatter scatter;
-  scatter.deviation = rows > 0.0 ? std::sqrt(squares / rows) : 0.0;
-  scatter.wander = near > 0.0 && fars > 0.0 ? far / fars / (near / nears) : core::kNan;
-  return scatter;
+// Standard deviation of the stamps about their places, in steps.
+double scatter_of(const Grid& grid) {
+  double squares = 0.0, rows = 0.0;
+  for (std::size_t k = 0; k < grid.off.size(); ++k) {
+    squares += grid.off[k] * grid.off[k];
+    rows += grid.starts[k] ? 0.0 : 1.0;
+  }
+  return rows > 0.0 ? std::sqrt(squares / rows) : 0.0;
 }
 
 // Share of the stamps' scatter that the motion shows: a sample against the middle of its neighbours, which are as far
@@ -275,9 +255,9 @@ std::optional<EvenClock> check_clock(const HealthView& view, std::vector<LogFind
   for (int pass = 0; pass < 2; ++pass) {
     grid = place_rows(view, refined(view, grid));
   }
-  const Scatter scatter = scatter_of(grid);
+  const double scatter = scatter_of(grid);
   if (static_cast<double>(grid.unplaced) > kMostUnplaced * static_cast<double>(grid.t.size()) ||
-      !(scatter.deviation > kScatters) || !(scatter.wander < kWanders)) {
+      !(scatter > kScatters)) {
     return std::nullopt;
   }
   const EvenClock clock{.step = grid.step, .drift = drift_of(view, grid)};
@@ -285,12 +265,12 @@ std::optional<EvenClock> check_clock(const HealthView& view, std::vector<LogFind
   const bool told = moved.error < kTold;
   const bool even = told && 1.0 - moved.share > kSure * moved.error &&
                     std::abs(moved.share) < std::max(kMostMoved, 3.0 * moved.error);
-  if (!even && (told || scatter.deviation < kMuchScatter)) {
+  if (!even && (told || scatter < kMuchScatter)) {
     return std::nullopt;
   }
   const std::string scatters =
       fmt::format("Stamps scatter by {:.2g} s ({:.2g} % of a step) about an even clock of {:.6g} s",
-                  scatter.deviation * clock.step, 100.0 * scatter.deviation, clock.step);
+                  scatter * clock.step, 100.0 * scatter, clock.step);
   LogFinding finding{.id = "time.even_clock",
                      .topic = FindingTopic::time,
                      .severity = FindingSeverity::notice,
