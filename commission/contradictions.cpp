@@ -216,18 +216,17 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
 }
 
 void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, std::vector<LogContradiction>& out) {
-  if (timing && s.robot.effort_delay_found) {
+  if (s.robot.effort_delay_found) {
     const Interval taken = s.robot.effort_delay;
     out.push_back({.kind = Kind::effort_timing,
                    .withdraws = false,
                    .demotes = true,
                    .subject = s.measurement.effort_columns.front(),
-                   .value = timing->delay,
-                   .limit = taken.upper,
-                   .sentence = fmt::format("the efforts come {:.3g} ± {:.1g} ms after the motion, which nobody "
-                                           "declares: a delay of {:g} to {:g} ms is taken in",
-                                           1e3 * timing->delay, 2e3 * timing->standard_error, 1e3 * taken.lower,
-                                           1e3 * taken.upper),
+                   .value = taken.upper,
+                   .limit = 0.0,
+                   .sentence = fmt::format("the efforts come up to {:g} ms after the motion, which nobody declares: a "
+                                           "delay of {:g} to {:g} ms is taken in",
+                                           1e3 * taken.upper, 1e3 * taken.lower, 1e3 * taken.upper),
                    .next = fmt::format("where it is known to lie there, `effort: {{delay: [{:g}, {:g}]}}` in the robot "
                                        "file declares it; stamp efforts and motion by one clock for narrower bounds",
                                        taken.lower, taken.upper)});

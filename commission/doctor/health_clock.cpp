@@ -14,19 +14,19 @@
 namespace wheelwright::doctor {
 namespace {
 
-constexpr std::size_t kFewestRows = 200;
-constexpr double kScatters = 2e-4;      // of a step, standard deviation: stamps of less are even
-constexpr double kMuchScatter = 0.05;   // the same, above which it is said that nothing can be told
-constexpr double kMostUnplaced = 0.02;  // share of rows that find no place
-constexpr double kSure = 6.0;           // standard errors
-constexpr double kMostMoved = 0.01;     // share of the scatter that even samples may show
-constexpr double kTold = 0.15;          // standard error of that share, above which nothing is told
-constexpr std::size_t kBlock = 20;      // rows whose errors may depend on each other
-constexpr std::size_t kRateRows = 500;  // of a stretch by which the rate is known
-constexpr double kTogether = 0.3;       // of the mean step: rows nearer than that come together
+constexpr std::size_t kClockRows = 200;
+constexpr double kClockScatters = 2e-4;      // of a step, standard deviation: stamps of less are even
+constexpr double kClockScattersMuch = 0.05;  // the same, above which it is said that nothing can be told
+constexpr double kClockUnplaced = 0.02;      // share of rows that find no place
+constexpr double kClockSure = 6.0;           // standard errors
+constexpr double kClockMoved = 0.01;         // share of the scatter that even samples may show
+constexpr double kClockTold = 0.15;          // standard error of that share, above which nothing is told
+constexpr std::size_t kClockBlock = 20;      // rows whose errors may depend on each other
+constexpr std::size_t kClockRateRows = 500;  // of a stretch by which the rate is known
+constexpr double kBurstTogether = 0.3;       // of the mean step: rows nearer than that come together
 
 // Rows of a log on the places of an even clock.
-struct Grid {
+struct ClockGrid {
   double step = 0.0;
   std::vector<double> t;     // s, of each row
   std::vector<double> off;   // of a step: the stamp against it
@@ -34,8 +34,8 @@ struct Grid {
   std::size_t unplaced = 0;  // rows that begin a stretch where the log goes on
 };
 
-Grid place_rows(const HealthView& view, double step) {
-  Grid grid{.step = step, .t = {}, .off = {}, .starts = {}};
+ClockGrid place_rows(const HealthView& view, double step) {
+  ClockGrid grid{.step = step, .t = {}, .off = {}, .starts = {}};
   core::EvenTimes times({.step = step, .drift = 0.0});
   for (const auto& [first, last] : view.segments) {
     for (std::size_t k = first; k < last; ++k) {
@@ -55,7 +55,7 @@ Grid place_rows(const HealthView& view, double step) {
 
 // visit(first, last) for each stretch of rows on places.
 template <typename Visit>
-void each_stretch(const Grid& grid, Visit visit) {
+void each_stretch(const ClockGrid& grid, Visit visit) {
   for (std::size_t first = 0; first < grid.t.size();) {
     std::size_t last = first + 1;
     while (last < grid.t.size() && !grid.starts[last]) {
@@ -66,12 +66,12 @@ void each_stretch(const Grid& grid, Visit visit) {
   }
 }
 
-// Rate of the stamps by the grid's, less 1, over rows [first, last), with its standard error.
-struct Rate {
+// ClockRate of the stamps by the grid's, less 1, over rows [first, last), with its standard error.
+struct ClockRate {
   double off = 0.0, error = 0.0;
 };
 
-Rate rate_of(const HealthView& view, const Grid& grid, std::size_t first, std::size_t last) {
+ClockRate rate_of(const HealthView& view, const ClockGrid& grid, std::size_t first, std::size_t last) {
   const auto n = static_cast<double>(last - first);
   double at = 0.0, late = 0.0;
   for (std::size_t k = first; k < last; ++k) {
@@ -85,7 +85,7 @@ Rate rate_of(const HealthView& view, const Grid& grid, std::size_t first, std::s
     xy += x * y;
     yy += y * y;
   }
-  Rate rate;
+  ClockRate rate;
   if (xx > 0.0) {
     rate.off = xy / xx;
     rate.error = std::sqrt(std::max(0.0, yy - xy * rate.off) / std::max(n - 2.0, 1.0) / xx);
@@ -94,7 +94,7 @@ Rate rate_of(const HealthView& view, const Grid& grid, std::size_t first, std::s
 }
 
 // The step by which rows far apart are a whole number of steps apart, from what they are by a shorter distance.
-double find_step(const HealthView& view) {
+double even_step(const HealthView& view) {
   const std::vector<double>& t = view.log->t;
   double step = view.step;
   std::size_t longest = 0;
@@ -113,7 +113,7 @@ double find_step(const HealthView& view) {
         }
       }
     }
-    if (each.size() < kFewestRows / 2) {
+    if (each.size() < kClockRows / 2) {
       break;
     }
     step = apart == 1 ? sum / static_cast<double>(each.size()) : core::median(std::move(each));
@@ -121,25 +121,25 @@ double find_step(const HealthView& view) {
   return step;
 }
 
-double refined(const HealthView& view, const Grid& grid) {
+double refined_step(const HealthView& view, const ClockGrid& grid) {
   double off = 0.0, weights = 0.0;
   each_stretch(grid, [&](std::size_t first, std::size_t last) {
     const double weight = std::pow(static_cast<double>(last - first), 3.0);
-    off += last - first > kBlock ? weight * rate_of(view, grid, first, last).off : 0.0;
-    weights += last - first > kBlock ? weight : 0.0;
+    off += last - first > kClockBlock ? weight * rate_of(view, grid, first, last).off : 0.0;
+    weights += last - first > kClockBlock ? weight : 0.0;
   });
   return grid.step * (1.0 + (weights > 0.0 ? off / weights : 0.0));
 }
 
 // Bound of |true rate/rate − 1|, stretch by stretch.
-double drift_of(const HealthView& view, const Grid& grid) {
+double drift_of(const HealthView& view, const ClockGrid& grid) {
   double drift = 0.0;
   std::size_t longest = 0;
   each_stretch(grid, [&](std::size_t first, std::size_t last) { longest = std::max(longest, last - first); });
-  const std::size_t rows = std::min(std::max(kRateRows, longest / 8), longest);
+  const std::size_t rows = std::min(std::max(kClockRateRows, longest / 8), longest);
   each_stretch(grid, [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k + rows <= last; k += rows) {
-      const Rate rate = rate_of(view, grid, k, k + rows);
+      const ClockRate rate = rate_of(view, grid, k, k + rows);
       drift = std::max(drift, std::abs(rate.off) + 3.0 * rate.error);
     }
   });
@@ -147,7 +147,7 @@ double drift_of(const HealthView& view, const Grid& grid) {
 }
 
 // Standard deviation of the stamps about their places, in steps.
-double scatter_of(const Grid& grid) {
+double stamp_scatter(const ClockGrid& grid) {
   double squares = 0.0, rows = 0.0;
   for (std::size_t k = 0; k < grid.off.size(); ++k) {
     squares += grid.off[k] * grid.off[k];
@@ -159,11 +159,11 @@ double scatter_of(const Grid& grid) {
 // Share of the stamps' scatter that the motion shows: a sample against the middle of its neighbours, which are as far
 // apart by the even clock, against where the stamps would have it. 1: samples are where their stamps say, 0: they are
 // even.
-struct Moved {
+struct MovedShare {
   double share = 0.0, error = 1.0;
 };
 
-Moved moved_share(const HealthView& view, const Grid& grid) {
+MovedShare moved_share(const HealthView& view, const ClockGrid& grid) {
   const bool angles = std::ranges::all_of(view.joints, [](const JointView& j) { return j.angle != nullptr; });
   double xx_all = 0.0, xc_all = 0.0, variance = 0.0;
   for (const JointView& joint : view.joints) {
@@ -189,9 +189,9 @@ Moved moved_share(const HealthView& view, const Grid& grid) {
       continue;
     }
     double errors = 0.0;
-    for (std::size_t k = 0; k < pairs.size(); k += kBlock) {
+    for (std::size_t k = 0; k < pairs.size(); k += kClockBlock) {
       double sum = 0.0;
-      for (std::size_t i = k; i < std::min(k + kBlock, pairs.size()); ++i) {
+      for (std::size_t i = k; i < std::min(k + kClockBlock, pairs.size()); ++i) {
         sum += pairs[i][0] * (pairs[i][1] - xc / xx * pairs[i][0]);
       }
       errors += sum * sum;
@@ -201,7 +201,7 @@ Moved moved_share(const HealthView& view, const Grid& grid) {
     xc_all += weight * xc;
     variance += weight * weight * errors;
   }
-  return xx_all > 0.0 ? Moved{xc_all / xx_all, std::sqrt(variance) / xx_all} : Moved{};
+  return xx_all > 0.0 ? MovedShare{xc_all / xx_all, std::sqrt(variance) / xx_all} : MovedShare{};
 }
 
 std::string clock_line(const EvenClock& clock) {
@@ -217,12 +217,12 @@ void check_bursts(const HealthView& view, std::vector<LogFinding>& out) {
     steps.push_back(t[k + 1] - t[k]);
     spans.push_back((t[k + kSpan] - t[k]) / static_cast<double>(kSpan));
   }
-  if (steps.size() < kFewestRows) {
+  if (steps.size() < kClockRows) {
     return;
   }
   const double mean = core::median(std::move(spans));
   const auto close = static_cast<double>(
-      std::ranges::count_if(steps, [&](double step) { return step >= 0.0 && step < kTogether * mean; }));
+      std::ranges::count_if(steps, [&](double step) { return step >= 0.0 && step < kBurstTogether * mean; }));
   const double share = close / static_cast<double>(steps.size());
   if (!(mean > 0.0) || share < 0.4) {
     return;
@@ -233,7 +233,7 @@ void check_bursts(const HealthView& view, std::vector<LogFinding>& out) {
                  .sentence = fmt::format("Rows come in bursts of about {:.3g}: {:.0f} % of them follow the row before "
                                          "within {:.0f} % of the mean step of {:.4g} s. The stamps are those of "
                                          "arrival; when the samples were taken they do not say.",
-                                         1.0 / (1.0 - share), 100.0 * share, 100.0 * kTogether, mean),
+                                         1.0 / (1.0 - share), 100.0 * share, 100.0 * kBurstTogether, mean),
                  .next = fmt::format("Stamp samples where they are taken (header.stamp set by the driver), or, where "
                                      "the sensor samples evenly and no row is lost, number them: t = row × {:.6g}.",
                                      mean),
@@ -247,25 +247,25 @@ void check_bursts(const HealthView& view, std::vector<LogFinding>& out) {
 
 std::optional<EvenClock> check_clock(const HealthView& view, std::vector<LogFinding>& findings) {
   check_bursts(view, findings);
-  if (view.robot.clock || view.log->rows() < kFewestRows || !(view.step > 0.0) || !view.has_motion() ||
+  if (view.robot.clock || view.log->rows() < kClockRows || !(view.step > 0.0) || !view.has_motion() ||
       !findings.empty()) {
     return std::nullopt;
   }
-  Grid grid = place_rows(view, find_step(view));
+  ClockGrid grid = place_rows(view, even_step(view));
   for (int pass = 0; pass < 2; ++pass) {
-    grid = place_rows(view, refined(view, grid));
+    grid = place_rows(view, refined_step(view, grid));
   }
-  const double scatter = scatter_of(grid);
-  if (static_cast<double>(grid.unplaced) > kMostUnplaced * static_cast<double>(grid.t.size()) ||
-      !(scatter > kScatters)) {
+  const double scatter = stamp_scatter(grid);
+  if (static_cast<double>(grid.unplaced) > kClockUnplaced * static_cast<double>(grid.t.size()) ||
+      !(scatter > kClockScatters)) {
     return std::nullopt;
   }
   const EvenClock clock{.step = grid.step, .drift = drift_of(view, grid)};
-  const Moved moved = moved_share(view, grid);
-  const bool told = moved.error < kTold;
-  const bool even = told && 1.0 - moved.share > kSure * moved.error &&
-                    std::abs(moved.share) < std::max(kMostMoved, 3.0 * moved.error);
-  if (!even && (told || scatter < kMuchScatter)) {
+  const MovedShare moved = moved_share(view, grid);
+  const bool told = moved.error < kClockTold;
+  const bool even = told && 1.0 - moved.share > kClockSure * moved.error &&
+                    std::abs(moved.share) < std::max(kClockMoved, 3.0 * moved.error);
+  if (!even && (told || scatter < kClockScattersMuch)) {
     return std::nullopt;
   }
   const std::string scatters =

@@ -12,22 +12,22 @@
 namespace wheelwright::doctor {
 namespace {
 
-constexpr double kLongest = 0.5;          // s, to either side
-constexpr double kBlock = 1.0;            // s, over which errors may depend on each other
-constexpr double kSure = 5.0;             // standard errors
-constexpr double kMatters = 0.5;          // of a step: less is within what a stamp says
-constexpr double kFits = 0.5;             // least share of the gyro's variation that the wheels must explain
-constexpr std::size_t kSmoothed = 2;      // rows to either side: interpolation averages what noise is left
-constexpr std::size_t kMostRows = 60000;  // looked at
-constexpr std::size_t kFewest = 10;       // blocks
-constexpr int kMostSteps = 8;             // of Gauss and Newton
+constexpr double kLagLongest = 0.5;      // s, to either side
+constexpr double kLagBlock = 1.0;        // s, over which errors may depend on each other
+constexpr double kLagSure = 5.0;         // standard errors
+constexpr double kLagMatters = 0.5;      // of a step: less is within what a stamp says
+constexpr double kLagFits = 0.5;         // least share of the gyro's variation that the wheels must explain
+constexpr std::size_t kLagSmoothed = 2;  // rows to either side: interpolation averages what noise is left
+constexpr std::size_t kLagRows = 60000;  // looked at
+constexpr std::size_t kLagBlocks = 10;   // blocks
+constexpr int kLagSteps = 8;             // of Gauss and Newton
 
-// Means over 2 kSmoothed + 1 rows: of both signals alike, so that no lag comes of it.
-std::vector<double> smoothed(const HealthView& view, const std::vector<double>& values) {
+// Means over 2 kLagSmoothed + 1 rows: of both signals alike, so that no lag comes of it.
+std::vector<double> smoothed_rows(const HealthView& view, const std::vector<double>& values) {
   std::vector<double> out(values.size());
   for (const auto& [first, last] : view.segments) {
     for (std::size_t k = first; k < last; ++k) {
-      const std::size_t half = std::min({kSmoothed, k - first, last - 1 - k});
+      const std::size_t half = std::min({kLagSmoothed, k - first, last - 1 - k});
       double sum = 0.0;
       for (std::size_t i = k - half; i <= k + half; ++i) {
         sum += values[i];
@@ -38,7 +38,7 @@ std::vector<double> smoothed(const HealthView& view, const std::vector<double>& 
   return out;
 }
 
-std::vector<double> speed_of(const HealthView& view, const JointView& joint) {
+std::vector<double> joint_speed_of(const HealthView& view, const JointView& joint) {
   if (joint.speed != nullptr) {
     return *joint.speed;
   }
@@ -61,17 +61,17 @@ struct LagFit {
   std::size_t blocks = 0;
 };
 
-struct Signals {
+struct YawSignals {
   std::vector<double> wheels, gyro;
 };
 
-std::optional<LagFit> fit_lag(const HealthView& view, const Signals& signals, double lag) {
+std::optional<LagFit> fit_lag(const HealthView& view, const YawSignals& signals, double lag) {
   const std::vector<double>& t = view.log->t;
   struct Row {
     double t, wheels, slope, gyro;
   };
   std::vector<Row> rows;
-  const std::size_t stride = 1 + t.size() / kMostRows;
+  const std::size_t stride = 1 + t.size() / kLagRows;
   for (const auto& [first, last] : view.segments) {
     std::size_t at = first;
     for (std::size_t k = first; k < last; k += stride) {
@@ -87,7 +87,7 @@ std::optional<LagFit> fit_lag(const HealthView& view, const Signals& signals, do
                       (signals.wheels[at + 1] - signals.wheels[at]) / h, signals.gyro[k]});
     }
   }
-  if (rows.size() < kFewest * 10) {
+  if (rows.size() < kLagBlocks * 10) {
     return std::nullopt;
   }
   const auto n = static_cast<double>(rows.size());
@@ -123,7 +123,7 @@ std::optional<LagFit> fit_lag(const HealthView& view, const Signals& signals, do
   };
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const Row& row = rows[k];
-    if (std::abs(row.t - begun) > kBlock) {
+    if (std::abs(row.t - begun) > kLagBlock) {
       close();
       begun = row.t;
     }
@@ -161,16 +161,16 @@ void check_gyro_delay(const HealthView& view, std::vector<LogFinding>& findings)
   if (gyro == nullptr || view.joints.size() != 2 || !view.has_motion() || !(view.step > 0.0)) {
     return;
   }
-  Signals signals{speed_of(view, view.joints[0]), smoothed(view, *gyro)};
-  const std::vector<double> left = speed_of(view, view.joints[1]);
+  YawSignals signals{joint_speed_of(view, view.joints[0]), smoothed_rows(view, *gyro)};
+  const std::vector<double> left = joint_speed_of(view, view.joints[1]);
   for (std::size_t k = 0; k < left.size(); ++k) {
     signals.wheels[k] -= left[k];
   }
-  signals.wheels = smoothed(view, signals.wheels);
+  signals.wheels = smoothed_rows(view, signals.wheels);
   double lag = 0.0, least = 0.0;
   const double stride = std::max(view.step, 0.01);
   std::optional<LagFit> fit;
-  for (double tried = -kLongest; tried <= kLongest; tried += stride) {
+  for (double tried = -kLagLongest; tried <= kLagLongest; tried += stride) {
     const std::optional<LagFit> at = fit_lag(view, signals, tried);
     if (at && (!fit || at->left / at->all < least)) {
       fit = at;
@@ -178,14 +178,14 @@ void check_gyro_delay(const HealthView& view, std::vector<LogFinding>& findings)
       lag = tried;
     }
   }
-  if (!fit || 1.0 - least < kFits || std::abs(lag) > kLongest - 2.0 * stride) {
+  if (!fit || 1.0 - least < kLagFits || std::abs(lag) > kLagLongest - 2.0 * stride) {
     return;
   }
-  for (int step = 0; fit && step < kMostSteps; ++step) {
+  for (int step = 0; fit && step < kLagSteps; ++step) {
     lag += std::clamp(fit->more, -stride, stride);
     fit = fit_lag(view, signals, lag);
   }
-  if (!fit || fit->blocks < kFewest || std::abs(lag) > kLongest) {
+  if (!fit || fit->blocks < kLagBlocks || std::abs(lag) > kLagLongest) {
     return;
   }
   const auto about = [&](const char* id, std::string sentence, std::string next, double value) {
@@ -198,7 +198,7 @@ void check_gyro_delay(const HealthView& view, std::vector<LogFinding>& findings)
                         .value = value,
                         .unit = "s"});
   };
-  if (std::abs(lag) > kSure * fit->error && std::abs(lag) > kMatters * view.step) {
+  if (std::abs(lag) > kLagSure * fit->error && std::abs(lag) > kLagMatters * view.step) {
     about(
         "time.gyro_delay",
         fmt::format("The gyro comes {:.3g} ± {:.1g} s {} the wheels (95 %).", std::abs(lag), 2.0 * fit->error,
@@ -209,7 +209,7 @@ void check_gyro_delay(const HealthView& view, std::vector<LogFinding>& findings)
         lag);
   }
   const double drift = fit->parts[1] - fit->parts[0], error = std::hypot(fit->errors[0], fit->errors[1]);
-  if (std::abs(drift) > kSure * error && std::abs(drift) > kMatters * view.step) {
+  if (std::abs(drift) > kLagSure * error && std::abs(drift) > kLagMatters * view.step) {
     about(
         "time.gyro_drift",
         fmt::format("From the first to the last third of the log the gyro falls {:.3g} ± {:.1g} s {} the wheels: their "
