@@ -151,6 +151,7 @@ int run(const Arguments& a) {
   logs::LogOptions reader = reader_options(a.common);
   reader.only = robots::useful_columns(model.robot);
   reader.heading_offset = model.robot.heading_offset;
+  reader.clock = model.robot.clock;
   if (a.follow) {
     return follow_input(a, model, std::move(detector), reader);
   }

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <deque>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -25,6 +26,7 @@
 #include "commission/watch/blind_watch.hpp"
 #include "commission/watch/incident_watch.hpp"
 #include "commission/watch/risk_watch.hpp"
+#include "core/even_clock.hpp"
 #include "detector/multiscale/pose_sums.hpp"
 #include "detector/multiscale/scale_detector.hpp"
 #include "detector/online_model.hpp"
@@ -446,23 +448,12 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
                              blindness.blind() ? ", blind" : "", open ? ", an incident is open" : "");
         });
   };
-  std::size_t lines = 0;  // of data, readable or not
-  while (in.next(line)) {
-    blindness.begin_line();
-    lines += logs::is_csv_content(line) ? 1 : 0;
-    try {
-      if (!parser.parse(line, row)) {
-        if (logs::is_csv_content(line)) {
-          blindness.undecided(std::nullopt);
-        }
-        continue;
-      }
-    } catch (const InputError& error) {
-      tell("wheelwright detect: {} (row left out)\n", error.what());
-      blindness.unreadable(error.what());
-      continue;
-    }
-    silence.row(row.t[0]);
+  std::optional<core::EvenTimes> even;
+  if (model.robot.clock && model.robot.clock->step > 0.0) {
+    even.emplace(*model.robot.clock);
+  }
+  std::deque<LogBlock> untimed;  // rows whose place a later one tells
+  const auto watch = [&] {
     for (std::size_t c = 0; c < sample.size(); ++c) {
       sample[c] = row.columns[(*pick)[c]][0];
     }
@@ -504,6 +495,37 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
         heartbeat(row.t[0]);
       }
       beat = row.t[0];
+    }
+  };
+  std::size_t lines = 0;  // of data, readable or not
+  while (in.next(line)) {
+    blindness.begin_line();
+    lines += logs::is_csv_content(line) ? 1 : 0;
+    try {
+      if (!parser.parse(line, row)) {
+        if (logs::is_csv_content(line)) {
+          blindness.undecided(std::nullopt);
+        }
+        continue;
+      }
+    } catch (const InputError& error) {
+      tell("wheelwright detect: {} (row left out)\n", error.what());
+      blindness.unreadable(error.what());
+      continue;
+    }
+    silence.row(row.t[0]);
+    if (!even) {
+      watch();
+      continue;
+    }
+    even->take(row.t[0], !row.segment_starts.empty());
+    untimed.push_back(row);
+    while (const auto place = even->next()) {
+      row = std::move(untimed.front());
+      untimed.pop_front();
+      row.t[0] = place->t;
+      row.segment_starts.assign(place->starts ? 1 : 0, 0);
+      watch();
     }
   }
   settle(true);

@@ -34,6 +34,7 @@ logs::LogOptions robot_reader(const Robot& robot, const CommonOptions& options) 
   logs::LogOptions reader = reader_options(options);
   reader.only = robots::useful_columns(robot);
   reader.heading_offset = robot.heading_offset;
+  reader.clock = robot.clock;
   return reader;
 }
 

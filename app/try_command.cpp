@@ -221,7 +221,14 @@ void settle_from_log(const Arguments& a, RobotWithOrigins& made) {
     } else if (robot.hold == Hold::zero_order && std::abs(steps - 0.5) < kHalfAStep) {
       robot.hold = Hold::first_order;
       made.origins["effort.hold"] = "efforts come half a step after the motion if they are held: they are measured";
+    } else if (delay->taken) {
+      robot.effort_delay = *delay->taken;
+      made.origins["effort.delay"] = fmt::format("0 to {:g} s: {}", delay->taken->upper, delay->sentence);
     }
+  }
+  if (health.clock) {
+    robot.clock = health.clock;
+    made.origins["clock"] = health.find("time.even_clock")->sentence;
   }
   if (const doctor::LogFinding* encoder = health.find("signals.encoder");
       encoder != nullptr && !robot.encoder_counts_per_turn) {
@@ -354,9 +361,11 @@ int run(const Arguments& given) {
     }
     robot = made.robot;
     yaml = robots::robot_yaml(made) + robots::columns_yaml(a.common.columns);
-    for (const char* key :
-         {"wheel_radius", "track_width", "nominal.mass", "effort.kind", "effort.hold", "encoder_counts_per_turn"}) {
-      if (const auto origin = made.origins.find(key); origin != made.origins.end()) {
+    for (const char* key : {"wheel_radius", "track_width", "nominal.mass", "effort.kind", "effort.hold", "effort.delay",
+                            "clock", "encoder_counts_per_turn"}) {
+      if (const auto origin = made.origins.find(key);
+          origin != made.origins.end() &&
+          (std::string_view(key) != "effort.delay" || robot.effort_delay != Interval{})) {
         took.push_back(fmt::format("{}: {}", key, origin->second));
       }
     }

@@ -108,6 +108,12 @@ Assumption assumed_clocks(const Commissioning& r) {
   Assumption a{.id = "clocks",
                .statement = "Stamps are those of the instants of measurement, of motion and effort by one clock.",
                .declared_by = {}};
+  if (const auto& clock = r.model.robot.clock; clock && clock->step > 0.0) {
+    a.declared_by = "clock";
+    a.statement = fmt::format(
+        "Samples of motion and effort are even, {:.9g} s apart to a share of {:.1g}, whatever their stamps say.",
+        clock->step, clock->drift);
+  }
   if (r.model.measurement.motion == MotionKind::angle) {
     a.test = "the angles are no smoother over row numbers than over their stamps";
   }

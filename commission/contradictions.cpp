@@ -216,6 +216,21 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
 }
 
 void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, std::vector<LogContradiction>& out) {
+  if (s.robot.effort_delay_found) {
+    const Interval taken = s.robot.effort_delay;
+    out.push_back({.kind = Kind::effort_timing,
+                   .withdraws = false,
+                   .demotes = true,
+                   .subject = s.measurement.effort_columns.front(),
+                   .value = taken.upper,
+                   .limit = 0.0,
+                   .sentence = fmt::format("the efforts come up to {:g} ms after the motion, which nobody declares: a "
+                                           "delay of {:g} to {:g} ms is taken in",
+                                           1e3 * taken.upper, 1e3 * taken.lower, 1e3 * taken.upper),
+                   .next = fmt::format("where it is known to lie there, `effort: {{delay: [{:g}, {:g}]}}` in the robot "
+                                       "file declares it; stamp efforts and motion by one clock for narrower bounds",
+                                       taken.lower, taken.upper)});
+  }
   if (!timing || !is_latency(*timing, s.survey.median_step)) {
     return;
   }
@@ -479,8 +494,8 @@ std::optional<Reach> reach_of(const LogContradiction& c, const Commissioning& re
 }
 
 bool is_weighed(const LogContradiction& c) {
-  return c.kind == Kind::effort_timing ||
-         (c.withdraws && (c.kind == Kind::wrong_sign || c.kind == Kind::estimate_outside));
+  return c.withdraws &&
+         (c.kind == Kind::effort_timing || c.kind == Kind::wrong_sign || c.kind == Kind::estimate_outside);
 }
 
 }  // namespace

@@ -134,7 +134,8 @@ void find_scattered_stamps(LogSource& log, const Setting& s, std::vector<LogCont
          .sentence = fmt::format("the motion is {:.2g} times as rough over the stamps as over the row numbers: "
                                  "the samples are even, their stamps scatter",
                                  1.0 / std::max(ratio, std::numeric_limits<double>::min())),
-         .next = "stamp samples where they are taken, or number them: times that go up by the cycle's length"});
+         .next = "stamp samples where they are taken, or give the cycle's length: `clock: {step: s}` in the robot file "
+                 "reads even samples by it"});
   }
 }
 

@@ -143,6 +143,15 @@ class TableSource final : public LogSource {
 /// Reads all of `source` (from its beginning) into a table, or its first `most` rows. The log is rewound.
 [[nodiscard]] LogTable read_all(LogSource& source, std::size_t most = static_cast<std::size_t>(-1));
 
+/// A sensor that takes sample k of a segment at φ + k·step, whatever its stamp says. Where the times of a segment begin
+/// does not matter to an equation of motion; their rate does.
+struct EvenClock {
+  double step = 0.0;   ///< s; 0: the stamps are the times of the samples
+  double drift = 0.0;  ///< bound of |true step/step − 1|, which changes slowly against a filter's memory
+
+  friend bool operator==(const EvenClock& a, const EvenClock& b) = default;
+};
+
 /// A bound on an error of one column of a log, in its unit.
 struct ColumnError {
   std::string column;
@@ -152,6 +161,7 @@ struct ColumnError {
 }  // namespace wheelwright::core
 
 namespace wheelwright {
+using core::EvenClock;
 using core::LogBlock;
 using core::LogSource;
 using core::LogTable;

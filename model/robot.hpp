@@ -110,6 +110,7 @@ struct Robot {
   Hold hold = Hold::first_order;
   EffortChanges effort_changes = EffortChanges::between;  ///< of a held effort
   Interval effort_delay{0.0, 0.0};        ///< s, holds the constant time by which logged efforts are late (< 0: early)
+  bool effort_delay_found = false;        ///< effort_delay is what a log shows, which nobody declared
   bool effort_unsigned = false;           ///< only |effort| was logged
   std::map<std::string, double> nominal;  ///< physical parameter -> value as designed
   std::map<std::string, Interval> prior;  ///< physical parameter -> bounds known beforehand
@@ -117,6 +118,8 @@ struct Robot {
   SensorNoise noise;
   FilterWish filter;
   std::optional<double> encoder_counts_per_turn;
+  std::optional<EvenClock> clock;  ///< of the sensors that sample evenly behind scattered stamps (step 0: the stamps
+                                   ///< hold); nothing: as the log shows
   SpeedSource speed_source = SpeedSource::automatic;
   PoseSource pose_source = PoseSource::automatic;
   double heading_offset = 0.0;  ///< rad, counterclockwise from the logged heading to the driving direction; readers of

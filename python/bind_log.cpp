@@ -205,6 +205,7 @@ logs::LogOptions reader_options(const RobotObject* robot, const std::map<std::st
   if (robot != nullptr) {
     options.only = robots::useful_columns(robot->robot);
     options.heading_offset = robot->robot.heading_offset;
+    options.clock = robot->robot.clock;
   }
   return options;
 }

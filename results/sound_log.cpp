@@ -17,6 +17,7 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
                         const std::vector<std::string>& despite, WheelPose pose, std::size_t threads) {
   reader.only = robots::useful_columns(robot);
   reader.heading_offset = robot.heading_offset;
+  reader.clock = robot.clock;
   SoundLog out;
   out.robot = robot;
   out.log = logs::open_log(paths, reader);
@@ -68,6 +69,17 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
       }
     }
     out.log = std::move(reopened);
+  }
+  if (const doctor::LogFinding* late = health.find("time.effort_delay");
+      late != nullptr && late->taken && pose == WheelPose::judged) {
+    out.robot.effort_delay = *late->taken;
+    out.robot.effort_delay_found = true;
+    out.remarks.push_back(late->sentence);
+  }
+  if (health.clock) {
+    out.log = logs::read_evenly(std::move(out.log), *health.clock);
+    out.robot.clock = health.clock;
+    out.remarks.push_back(health.find("time.even_clock")->sentence);
   }
   return out;
 }

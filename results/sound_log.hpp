@@ -33,8 +33,10 @@ struct SoundLog {
 
 /// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first kExaminedRows: for
 /// findings that refuse it (LogFinding::is_refusal()) InputError names them, and what to do. `despite` passes over
-/// findings by their names. Other fatal findings (nothing excited, a dead signal, efforts late) are left to the
-/// callers, which have an answer of their own to each. A log that lacks columns is not examined. Throws as open_log().
+/// findings by their names. Other fatal findings (nothing excited, a dead signal, efforts that are far too late) are
+/// left to the callers, which have an answer of their own to each. Even samples behind scattered stamps are read by
+/// their own clock, and (where the pose is judged) efforts that are a little late are taken for late: SoundLog::robot
+/// and a remark say so. A log that lacks columns is not examined. Throws as open_log().
 [[nodiscard]] SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot,
                                       logs::LogOptions reader, const std::vector<std::string>& despite, WheelPose pose,
                                       std::size_t threads = 1);

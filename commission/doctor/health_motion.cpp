@@ -25,6 +25,8 @@ constexpr double kChangedPlaces = 0.15;     // sum of |log| of two ratios to nom
 constexpr double kMostTimesNominal = 20.0;  // a robot may carry a load
 constexpr double kLeastTimesNominal = 0.2;  // and loses less
 constexpr double kUnusedRisk = 1e-3;        // for fit_log; not used further
+constexpr double kLongestTaken = 0.03;      // s: efforts later than this are refused
+constexpr double kTakenFrom = 0.5;          // of the least shift that is a latency
 
 LogFinding about_motion(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
                         std::string unit) {
@@ -419,16 +421,19 @@ void check_delay(const HealthView& view, const commission::Setting& s, const com
                        (std::abs(delay) > 3.0 * error && left < 0.95 && std::abs(delay) > 0.25 * view.step);
   const bool large = matters && std::abs(delay) > 0.75 * view.step;
   const bool latency = view.robot_given && commission::is_latency(*timing, view.step);
+  const double longest = std::ceil(1e4 * (delay + 5.0 * error)) / 1e4;
+  const bool taken = view.robot_given && delay > 0.0 && longest <= kLongestTaken && s.measurement.delay == Interval{} &&
+                     view.robot.effects.empty() && commission::is_latency(*timing, kTakenFrom * view.step);
   // Declared errors may allow for a step of it: commissioning weighs that.
   const model::SensorNoise& declared = view.robot.noise;
   const bool weighed = declared.effort.value && (declared.wheel_speed.value || declared.wheel_angle.value) &&
                        timing->beyond() <= view.step;
   LogFinding f{.id = "time.effort_delay",
                .topic = FindingTopic::time,
-               .severity = latency && !weighed ? FindingSeverity::fatal
-                           : large || latency  ? FindingSeverity::warning
-                           : matters           ? FindingSeverity::notice
-                                               : FindingSeverity::fine};
+               .severity = latency && !weighed && !taken ? FindingSeverity::fatal
+                           : large || latency || taken   ? FindingSeverity::warning
+                           : matters                     ? FindingSeverity::notice
+                                                         : FindingSeverity::fine};
   f.columns = s.measurement.effort_columns;
   f.value = delay;
   f.unit = std::string("s");
@@ -456,6 +461,14 @@ void check_delay(const HealthView& view, const commission::Setting& s, const com
                         "sensor is slow: `wheelwright gap` tells them apart."
            : matters  ? "It is less than a step: `effort.hold` in the robot file counts for half of one."
                       : "";
+  if (taken) {
+    f.taken = Interval{0.0, longest};
+    f.sentence += fmt::format(
+        " Commands take it for a delay of 0 to {:g} s: bounds widen by what the efforts change in "
+        "that time and a step, and none is called guaranteed.",
+        longest);
+    f.next = fmt::format("`effort: {{delay: [0, {:g}]}}` in the robot file declares it. {}", longest, f.next);
+  }
   out.push_back(f);
 }
 

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/check.hpp"
+#include "core/even_clock.hpp"
 #include "core/for_all.hpp"
 #include "core/statistics.hpp"
 #include "core/words.hpp"
@@ -381,10 +382,14 @@ const LogFinding* LogHealth::find(std::string_view id) const {
   return at == findings.end() ? nullptr : &*at;
 }
 
-LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const ReaderCounts& reader,
+LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, const ReaderCounts& reader,
                   std::size_t threads) {
-  const HealthView view = make_view(log, robot);
   LogHealth health;
+  health.clock = check_clock(make_view(stamped, robot), health.findings);
+  const std::optional<LogTable> even =
+      health.clock ? std::optional(core::read_evenly(stamped, *health.clock)) : std::nullopt;
+  const LogTable& log = even ? *even : stamped;
+  const HealthView view = make_view(log, robot);
   health.rows = log.rows();
   health.segments = view.segments.size();
   health.median_step = view.step;
@@ -402,6 +407,7 @@ LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const 
         [&] {
           check_signals(view, reader, health.findings);
           check_odometry(view, health.findings);
+          check_gyro_delay(view, health.findings);
         },
         [&] { reaches_bounds = check_motion(view, of_motion); });
     std::ranges::move(of_motion, std::back_inserter(health.findings));

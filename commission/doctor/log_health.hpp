@@ -45,9 +45,10 @@ struct LogFinding {
   double value = std::numeric_limits<double>::quiet_NaN();  ///< the number behind it, NaN where there is none
   std::string unit{};                                       ///< of value, "1" for a share or a ratio
   double margin = 0.0;  ///< by which value may be wrong (5 standard errors), where commands use it; else 0
-  std::vector<Interval> when{};  ///< stretches of the log, s of log time: the first kMostStretches
-  std::size_t stretches = 0;     ///< how many there are altogether; 0: everywhere, or nowhere in particular
-  bool refuses = false;          ///< a fatal one: no command makes a model of the log, as for every fatal one of units
+  std::optional<Interval> taken{};  ///< what commands take value to lie in, where the robot file declares nothing
+  std::vector<Interval> when{};     ///< stretches of the log, s of log time: the first kMostStretches
+  std::size_t stretches = 0;        ///< how many there are altogether; 0: everywhere, or nowhere in particular
+  bool refuses = false;  ///< a fatal one: no command makes a model of the log, as for every fatal one of units
 
   /// True if commands that make something of a log refuse it for this (results/sound_log.hpp).
   [[nodiscard]] bool is_refusal() const {
@@ -85,9 +86,10 @@ struct LogHealth {
   std::vector<LogFinding> findings;  ///< the gravest first; among equals in the order time, signals, motion, units
   std::size_t rows = 0;              ///< that were looked at
   std::size_t segments = 0;
-  double seconds = 0.0;      ///< of driving, gaps left out
-  double median_step = 0.0;  ///< s
-  std::string assumed;       ///< what was taken for granted where no robot was given, in words; else empty
+  double seconds = 0.0;            ///< of driving, gaps left out
+  double median_step = 0.0;        ///< s
+  std::optional<EvenClock> clock;  ///< of even samples behind scattered stamps, by which the log was looked at
+  std::string assumed;             ///< what was taken for granted where no robot was given, in words; else empty
 
   /// Number of findings of this severity.
   [[nodiscard]] std::size_t count(FindingSeverity severity) const;
@@ -99,11 +101,12 @@ struct LogHealth {
 /// a differential drive or a single axis, by the columns) tells columns, geometry, limits and the model whose
 /// excitation is judged; without it, scales of units cannot be judged against radius, track and mass.
 ///
-/// The checks and their thresholds are in docs/use/doctor.md. Excitation is that of the filtered regressor (25) as
-/// commission_robot() makes it: settle(), fit_log() and identifiability(); the delay between effort and motion is that
-/// of TimeShiftedRows with its standard error. Throws nothing for what a log may hold; InvalidArgument for a robot that
-/// makes no sense, a log whose columns differ in length, or segments that do not ascend over its rows. The result does
-/// not depend on `threads`.
+/// Where stamps scatter about an even clock and the motion shows that the samples do not, everything is looked at by
+/// that clock (LogHealth::clock). The checks and their thresholds are in docs/use/doctor.md. Excitation is that of the
+/// filtered regressor (25) as commission_robot() makes it: settle(), fit_log() and identifiability(); the delay between
+/// effort and motion is that of TimeShiftedRows with its standard error. Throws nothing for what a log may hold;
+/// InvalidArgument for a robot that makes no sense, a log whose columns differ in length, or segments that do not
+/// ascend over its rows. The result does not depend on `threads`.
 [[nodiscard]] LogHealth examine(const LogTable& log, const std::optional<Robot>& robot = std::nullopt,
                                 const ReaderCounts& reader = {}, std::size_t threads = 1);
 
@@ -149,6 +152,9 @@ struct HealthView {
 /// Puts the stretches of rows that `flagged` marks into `finding`; marks less than `join` s apart are one stretch.
 void set_stretches(LogFinding& finding, const HealthView& view, const std::vector<bool>& flagged, double join);
 
+/// Rows that come in bursts; stamps that scatter about an even clock. Returns that clock where motion shows that the
+/// samples are even, and the robot does not say how the log is to be read.
+[[nodiscard]] std::optional<EvenClock> check_clock(const HealthView& view, std::vector<LogFinding>& findings);
 /// Rates, jitter, what is missing between rows, stamps that are too coarse, length.
 void check_time(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings);
 /// Columns that stand still, repeat, are coarse or noisy, or end at a limit; rest.
@@ -156,6 +162,9 @@ void check_signals(const HealthView& view, const ReaderCounts& reader, std::vect
 /// Directions, speeds, accelerations; what the filtered regressor says of each parameter; effort against motion in
 /// time. Returns whether commissioning would get as far as bounds.
 bool check_motion(const HealthView& view, std::vector<LogFinding>& findings);
+/// Lag of the gyro behind the yaw rate that the wheels show, and how it drifts from the first to the last third of the
+/// log.
+void check_gyro_delay(const HealthView& view, std::vector<LogFinding>& findings);
 /// Wheel angles against speeds, wheels against pose and gyro: scales, signs, sides.
 void check_odometry(const HealthView& view, std::vector<LogFinding>& findings);
 

@@ -115,6 +115,12 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds, bool sums
         "export: the efforts are late by {:g} to {:g} s, which has no C form; expected a model whose effort.delay is 0",
         measurement_.delay.lower, measurement_.delay.upper));
   }
+  if (measurement_.clock_drift > 0.0) {
+    throw InputError(
+        "export: the model is read by an even clock behind scattered stamps, which has no C form; expected a model "
+        "whose "
+        "`clock` has no drift, for times that the caller counts by himself");
+  }
   for (std::size_t k = 0; k < model_.terms.size(); ++k) {
     if (model_.terms[k].kind == Term::Kind::function) {
       functions_.push_back({k, c_form(model_, model_.terms[k])});

@@ -13,6 +13,7 @@
 
 #include "core/check.hpp"
 #include "core/error.hpp"
+#include "core/even_clock.hpp"
 #include "formats/logs/bag.hpp"
 #include "formats/logs/bag_log.hpp"
 #include "formats/logs/csv.hpp"
@@ -43,7 +44,26 @@ std::string state_of(const std::filesystem::path& path) {
   return state;
 }
 
+class EvenLog final : public RecordedLog {
+ public:
+  EvenLog(std::shared_ptr<RecordedLog> log, const EvenClock& clock) : log_(log), even_(std::move(log), clock) {}
+  [[nodiscard]] const std::vector<std::string>& columns() const override { return even_.columns(); }
+  bool next(LogBlock& block) override { return even_.next(block); }
+  void rewind() override { even_.rewind(); }
+  [[nodiscard]] double median_step() const override { return even_.median_step(); }
+  [[nodiscard]] std::unique_ptr<LogSource> another_walk() const override { return even_.another_walk(); }
+  [[nodiscard]] const LogReport& report() const override { return log_->report(); }
+
+ private:
+  std::shared_ptr<RecordedLog> log_;
+  core::EvenSource even_;
+};
+
 }  // namespace
+
+std::unique_ptr<RecordedLog> read_evenly(std::unique_ptr<RecordedLog> log, const EvenClock& clock) {
+  return std::make_unique<EvenLog>(std::move(log), clock);
+}
 
 std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& paths, const LogOptions& options) {
   check::that(!paths.empty(), "paths", "at least one file");
@@ -87,6 +107,9 @@ std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& 
                       "twice count as new ones",
                       read[k].path, same->path));
     }
+  }
+  if (options.clock && options.clock->step > 0.0) {
+    return read_evenly(std::move(log), *options.clock);
   }
   return log;
 }

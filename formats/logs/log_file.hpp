@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,13 @@ namespace wheelwright::logs {
 struct LogOptions : CsvOptions {
   /// Directories with definitions of messages (PKG/msg/TYPE.msg below them), for bags that do not bring their own.
   std::vector<std::filesystem::path> msg_path;
+  /// By which rows are timed in place of their stamps, where its step is > 0 (read_evenly()).
+  std::optional<EvenClock> clock;
 };
+
+/// `log` with its rows timed by `clock`; its report stays that of the files. Throws InvalidArgument as
+/// core::EvenTimes.
+[[nodiscard]] std::unique_ptr<RecordedLog> read_evenly(std::unique_ptr<RecordedLog> log, const EvenClock& clock);
 
 /// Opens a log in one or several files or bag directories, told apart by their content; each begins a new segment.
 /// All of it is read once, as RowLog says, and kept in memory where 256 MiB are enough for that (RowLogOptions).

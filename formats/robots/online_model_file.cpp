@@ -230,6 +230,7 @@ Measurement measurement_at(const JsonPlace& place, const Model& model, const Rob
   m.shortest_step = bound_at(place.at("shortest_step"));
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
+  m.clock_drift = robot.clock ? robot.clock->drift : 0.0;
   m.correction = filter::effort_correction(robot);
   if (m.motion_columns.size() != model.joints.size() || m.effort_columns.size() != model.joints.size()) {
     place.fail("one motion column and one effort column for each joint of the model");

@@ -61,7 +61,8 @@ struct RobotReader {
                                        "speed_source",   "pose_source",
                                        "heading_offset", "limits",
                                        "kinematic",      "motor",
-                                       "effects",        "columns"});
+                                       "effects",        "columns",
+                                       "clock"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }
@@ -200,6 +201,8 @@ struct RobotReader {
           robot.effort_unsigned = value.boolean();
         }
       }
+    } else if (key == "clock") {
+      read_clock(place);
     } else if (key == "noise") {
       read_noise(place);
     } else if (key == "filter") {
@@ -234,6 +237,25 @@ struct RobotReader {
       ends[1].fail(expected);
     }
     return interval;
+  }
+
+  void read_clock(const YamlPlace& place) {
+    robot.clock.emplace();
+    if (place.is_scalar()) {
+      place.demand("stamps");
+      return;
+    }
+    for (const auto& [name, value] : place.members({"step", "drift"})) {
+      if (name == "step") {
+        robot.clock->step = value.positive();
+      } else {
+        robot.clock->drift =
+            value.number("a share >= 0 and below 0.1", [](double share) { return share >= 0.0 && share < 0.1; });
+      }
+    }
+    if (!(robot.clock->step > 0.0)) {
+      place.fail("the key step (s)");
+    }
   }
 
   void read_noise(const YamlPlace& place) {
@@ -464,6 +486,10 @@ Json to_json(const Robot& robot) {
   out["filter"] = filter_of(robot.filter);
   if (robot.encoder_counts_per_turn) {
     out["encoder_counts_per_turn"] = *robot.encoder_counts_per_turn;
+  }
+  if (robot.clock) {
+    out["clock"] =
+        robot.clock->step > 0.0 ? Json{{"step", robot.clock->step}, {"drift", robot.clock->drift}} : Json("stamps");
   }
   out["speed_source"] = sources[static_cast<std::size_t>(robot.speed_source)];
   if (robot.pose_source == model::PoseSource::independent) {

@@ -31,6 +31,7 @@ namespace wheelwright::robots {
 ///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto |
 ///     encoder_difference | measured, pose_source: auto | independent, heading_offset: rad,
 ///     limits: {effort, speed, acceleration},
+///     clock: stamps | {step: s, drift: share} (core/even_clock.hpp),
 ///     motor: {torque_constant, resistance, back_emf, gear_ratio},
 ///     effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp),
 ///     columns: {name: column}, which read_columns() hands out

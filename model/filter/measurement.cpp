@@ -111,6 +111,7 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   m.hold = robot.hold;
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
+  m.clock_drift = robot.clock ? robot.clock->drift : 0.0;
   m.effort_unsigned = robot.effort_unsigned;
   m.nominal_step = log.median_step();
   m.shortest_step = shortest_step_of(log);

@@ -59,6 +59,7 @@ struct Measurement {
   model::EffortChanges changes =
       model::EffortChanges::between;  ///< what an effort may do between two samples, beside `hold`
   Interval delay{0.0, 0.0};           ///< s, holds the constant time by which logged efforts are late
+  double clock_drift = 0.0;           ///< bound of the relative error of the times between samples (core::EvenClock)
 
   /// A longer step between two samples is a hole in the log: nothing is known of the effort in it, s; 0 where no step
   /// is known. 1.75 nominal steps, for steps that vary less: as long as two of the shortest together, but at least 1.35

@@ -146,6 +146,12 @@ void RegressorFilter::write_row() {
     Y[entry.at] += out[entry.signal];
     dY[entry.at] += out[entry.signal - functions_ + function_doubt_];
   }
+  // By a clock that is wrong by 1 + ε the equation holds with an inertia of m(1 + ε)² and a friction of b(1 + ε).
+  if (const double drift = measurement().clock_drift; drift > 0.0) {
+    for (Eigen::Index k = 0; k < row_.Y.size(); ++k) {
+      dY[k] += drift * (2.0 + drift) * std::abs(Y[k]);
+    }
+  }
   const double area = bounded ? std::max(1.0, out[area_] / static_gain_) : 1.0;
   for (Eigen::Index i = 0; i < row_.y.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
