@@ -8,6 +8,7 @@
 #   tests/long.sh mutations [COUNT]  every reader on 100,000 mutations, or so many: slowest input and memory
 #   tests/long.sh endurance   a day at 1 kHz, with trouble every hour (tests/campaigns/endurance.py, ten minutes)
 #   tests/long.sh faults      kills, full disks, closed streams and the like, 2,000 of them (tests/campaigns/faults.py, as root)
+#   tests/long.sh ordinary    200 logs of each kind of odd log, judged (tests/campaigns/ordinary_logs.py, hours)
 #   tests/long.sh coverage    lines that the tests run, by room, and those they do not (tools/coverage.py)
 #   tests/long.sh alone       every source file by itself, by clang (tools/check_alone.py, ten minutes)
 #   tests/long.sh tidy        clang-tidy (tools/check_tidy.py, half an hour)
@@ -38,6 +39,10 @@ for part in ${*:-slow campaign sanitizers}; do
     faults)
       tools/build.sh release wheelwright
       tests/campaigns/faults.py --program build/bin/wheelwright
+      ;;
+    ordinary)
+      tools/build.sh release wheelwright wheelwright_python
+      tests/campaigns/ordinary_logs.py --threads "$jobs" --same-account --python build/python
       ;;
     coverage)
       tools/build.sh coverage
@@ -86,8 +91,8 @@ for part in ${*:-slow campaign sanitizers}; do
       ;;
     [0-9]*) ;;
     *)
-      echo "usage: tests/long.sh [slow] [campaign] [endurance] [faults] [coverage] [alone] [tidy] [sanitizers]" \
-        "| fuzz [SECONDS] | mutations [COUNT]" >&2
+      echo "usage: tests/long.sh [slow] [campaign] [endurance] [faults] [ordinary] [coverage] [alone] [tidy]" \
+        "[sanitizers] | fuzz [SECONDS] | mutations [COUNT]" >&2
       exit 2
       ;;
   esac
