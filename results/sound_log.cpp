@@ -55,7 +55,7 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
   if (const doctor::LogFinding* turned = health.find("units.heading_offset")) {
     out.robot.heading_offset += turned->value;
     if (std::optional<double>& heading = out.robot.noise.heading.value) {
-      *heading += turned->margin;
+      *heading += 0.5 * (turned->taken->upper - turned->taken->lower);
     }
     reader.heading_offset = out.robot.heading_offset;
     out.remarks.push_back(fmt::format("{} {}", turned->sentence, turned->next));

@@ -577,7 +577,8 @@ std::optional<DrivingDirection> turned_heading(const HealthView& view, std::vect
       fmt::format("It is taken off on reading; `heading_offset: {:.4f}` in the robot file settles it.", found->offset),
       {"theta"}, found->offset);
   f.unit = "rad";
-  f.margin = kOffsetErrors * found->error;
+  const double margin = kOffsetErrors * found->error;
+  f.taken = Interval{found->offset - margin, found->offset + margin};
   out.push_back(f);
   return found;
 }

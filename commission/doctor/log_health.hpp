@@ -44,7 +44,6 @@ struct LogFinding {
   std::vector<std::string> columns{};                       ///< of the log that it is about; empty: the log as a whole
   double value = std::numeric_limits<double>::quiet_NaN();  ///< the number behind it, NaN where there is none
   std::string unit{};                                       ///< of value, "1" for a share or a ratio
-  double margin = 0.0;  ///< by which value may be wrong (5 standard errors), where commands use it; else 0
   std::optional<Interval> taken{};  ///< what commands take value to lie in, where the robot file declares nothing
   std::vector<Interval> when{};     ///< stretches of the log, s of log time: the first kMostStretches
   std::size_t stretches = 0;        ///< how many there are altogether; 0: everywhere, or nowhere in particular
