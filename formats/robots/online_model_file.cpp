@@ -230,7 +230,10 @@ Measurement measurement_at(const JsonPlace& place, const Model& model, const Rob
   m.shortest_step = bound_at(place.at("shortest_step"));
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
-  m.correction = filter::effort_correction(robot);
+  m.correction = filter::effort_correction(robot, m.motion != MotionKind::angle);
+  if (m.motion == MotionKind::speed) {
+    m.cut = robot.speed_cut;
+  }
   if (m.motion_columns.size() != model.joints.size() || m.effort_columns.size() != model.joints.size()) {
     place.fail("one motion column and one effort column for each joint of the model");
   }
