@@ -30,8 +30,8 @@ enum class RowOutcome {
 /// A wheel angle that may be wrapped, made continuous. It counts as wrapped from the first jump on that nothing else
 /// explains: by more than half a turn, while all values so far lie within one turn, and with the turn taken away within
 /// a quarter of a turn of where the last step leads. From then on every step is the one that is closest to the
-/// last, per second, or the shortest where none of them is within a quarter of a turn of it. The same for the range of a
-/// counter, some turns or 2^16 or 2^32 counts of which a whole number make a turn, from the second jump by it on.
+/// last, per second, or the shortest where none of them is within a quarter of a turn of it. The same for the range of
+/// a counter, some turns or 2^16 or 2^32 counts of which a whole number make a turn, from its second jump on.
 class WheelAngle {
  public:
   /// `angle` (rad) at `time` (s), later than the last one, with the turns that were undone. `predict` is false where so

@@ -65,8 +65,8 @@ bool is_decimal(double quantum, double near) {
   return std::ranges::any_of(std::vector{1.0, 2.0, 5.0}, [&](double d) { return std::abs(scaled / d - 1.0) < near; });
 }
 
-// The whole number that `counts`, known to ±`doubt`, is taken for: a power of two, else a whole hundred, where one is as
-// near as that, else the nearest.
+// The whole number that `counts`, known to ±`doubt`, is taken for: a power of two, else a whole hundred, where one is
+// as near as that, else the nearest.
 double whole_counts(double counts, double doubt) {
   const double power = std::exp2(std::round(std::log2(counts))), hundred = 100.0 * std::round(counts / 100.0);
   for (const double round : {power, hundred}) {
