@@ -169,8 +169,8 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings);
 bool check_direction(const HealthView& view, std::vector<LogFinding>& findings);
 /// Speeds in whole multiples of a unit that no encoder makes, rounded or cut off.
 void check_rounding(const HealthView& view, std::vector<LogFinding>& findings);
-/// Efforts that are early because speeds passed through a low-pass filter, in this setting with its fit. Returns whether
-/// that, or that it cannot be told from a delay, was said.
+/// Efforts that are early because speeds passed through a low-pass filter, in this setting with its fit. Returns
+/// whether that, or that it cannot be told from a delay, was said.
 bool check_smoothing(const HealthView& view, const commission::Setting& setting, const commission::Fit& fit,
                      std::vector<LogFinding>& findings);
 /// Wheel angles against speeds, wheels against pose and gyro: scales, signs, sides.
