@@ -16,7 +16,8 @@
 namespace wheelwright::commission {
 
 /// What makes efforts early against speeds. Speeds that a driver smooths and an actuator that is slow to follow give
-/// one and the same equation: which of the two it is efforts and speeds cannot tell, and parameters do not depend on it.
+/// one and the same equation: which of the two it is efforts and speeds cannot tell, and parameters do not depend on
+/// it.
 struct SpeedSmoothing {
   model::SpeedFilter filter;    ///< found, with the interval that holds the time constant at a risk of 1e-4; the number
                                 ///< of rows of a mean is exact where the interval holds one whole number
