@@ -18,6 +18,7 @@ using core::Warrant;
 namespace {
 
 constexpr const char* kMotionInDriving = "motion_in_driving";
+constexpr const char* kSpeedFilter = "speed_filter";
 
 constexpr const char* kRowsExplained =
     "some parameters explain every row within its bound, and none of the held-out rows "
@@ -135,6 +136,31 @@ Assumption assumed_speeds(const Measurement& m) {
       a.detail = m.count > 0.0 ? "the speeds are whole multiples of one count a step" : "taken as the robot file says";
       break;
     case MotionKind::speed: a.statement = "Wheel speeds are samples of the speed at their stamps."; break;
+  }
+  return a;
+}
+
+// A filter commutes with what is linear: not with the sign of a speed, nor with products. Detail: why nothing that
+// stands on it is guaranteed.
+Assumption assumed_filter(const Commissioning& r, const model::SpeedFilter& filter) {
+  Assumption a{.id = kSpeedFilter,
+               .statement = fmt::format("Wheel speeds passed through a low-pass filter ({}) of {:g} to {:g} s before "
+                                        "they were logged, and efforts did not.",
+                                        to_string(filter.kind), filter.time.lower, filter.time.upper),
+               .declared_by = "speed_filter"};
+  const bool linear =
+      std::ranges::none_of(r.model.model.terms, [](const Term& term) { return term.kind == Term::Kind::function; });
+  const bool exact =
+      filter.kind != model::SpeedFilterKind::lag &&
+      (r.model.robot.hold == Hold::first_order || r.model.robot.effort_changes == model::EffortChanges::at_samples);
+  if (!linear) {
+    a.detail =
+        "efforts that pass through the same filter are those of filtered speeds only where the model is linear "
+        "in speeds, and this one is not";
+  } else if (!exact) {
+    a.detail = "what the efforts do between samples goes through the filter unseen";
+  } else if (filter.found) {
+    a.detail = "time constant and kind of the filter were learnt from the log, and are not declared";
   }
   return a;
 }
@@ -340,6 +366,9 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   const Robot& robot = result.model.robot;
   std::vector<Assumption> list = {assumed_hold(robot), assumed_delay(result), assumed_clocks(result),
                                   assumed_speeds(result.model.measurement)};
+  if (robot.speed_filter && result.model.measurement.correction.smoothing) {
+    list.push_back(assumed_filter(result, *robot.speed_filter));
+  }
   add_noise_bounds(list, result, rows);
   list.push_back(model_shape(result, rows));
   list.push_back(constant_parameters(rows));
@@ -367,7 +396,8 @@ void settle_warrants(Commissioning& result) {
   result.assumptions = assumptions_of(result);
   bool contradicted = false, driving_contradicted = false;
   for (const Assumption& assumption : result.assumptions) {
-    if (assumption.verdict == AssumptionVerdict::fails) {
+    if (assumption.verdict == AssumptionVerdict::fails ||
+        (assumption.id == kSpeedFilter && !assumption.detail.empty())) {
       (assumption.id == kMotionInDriving ? driving_contradicted : contradicted) = true;
     }
   }

@@ -14,6 +14,7 @@
 #include "commission/physical.hpp"
 #include "commission/setting.hpp"
 #include "commission/setting_rows.hpp"
+#include "commission/speed_smoothing.hpp"
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
@@ -215,7 +216,8 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
   return what + "; " + declare;
 }
 
-void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, std::vector<LogContradiction>& out) {
+void find_latency(LogSource& log, const Setting& s, const Fit& fit, const std::optional<EffortTiming>& timing,
+                  std::vector<LogContradiction>& out) {
   if (s.robot.effort_delay_found) {
     const Interval taken = s.robot.effort_delay;
     out.push_back({.kind = Kind::effort_timing,
@@ -232,6 +234,15 @@ void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, s
                                        taken.lower, taken.upper)});
   }
   if (!timing || !is_latency(*timing, s.survey.median_step)) {
+    return;
+  }
+  if (const auto smoothing = may_be_smoothed(s, *timing) ? speed_smoothing(log, s, fit) : std::nullopt) {
+    out.push_back({.kind = Kind::effort_timing,
+                   .subject = s.measurement.motion_columns.front(),
+                   .value = timing->delay,
+                   .limit = kLeastShift * s.survey.median_step,
+                   .sentence = late_speeds(*smoothing),
+                   .next = way_out(*smoothing)});
     return;
   }
   out.push_back(
@@ -402,7 +413,7 @@ SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit
   find_unrelated_efforts(s, joints, found);
   if (found.empty()) {  // nothing else is worth a word beside a dead sensor
     findings.timing = effort_timing(log, s, fit);
-    find_latency(s, findings.timing, found);
+    find_latency(log, s, fit, findings.timing, found);
     find_wrong_signs(s, fit, found);
     find_dry_friction(log, s, found);
     find_uneven_efforts(s, joints, found);

@@ -80,6 +80,15 @@ const std::string& effort_column(const Joint& joint, EffortKind kind) {
   return kind == EffortKind::torque ? joint.torque : kind == EffortKind::current ? joint.current : joint.voltage;
 }
 
+std::string_view to_string(SpeedFilterKind kind) {
+  switch (kind) {
+    case SpeedFilterKind::exponential: return "exponential";
+    case SpeedFilterKind::lag: return "lag";
+    case SpeedFilterKind::mean: return "mean";
+  }
+  return "";
+}
+
 double RobotEffect::value(const std::string& parameter) const {
   const auto found = parameters.find(parameter);
   check::that(found != parameters.end(), "effects." + name, "the parameter " + parameter);

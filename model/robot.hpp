@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/interval.hpp"
@@ -41,6 +42,37 @@ enum class SpeedSource {
   automatic,           ///< found from the data
   encoder_difference,  ///< encoder counts differenced over a sampling interval: angles are rebuilt from them
   measured,            ///< samples of the speed itself
+};
+
+/// Low-pass filter of the wheel speeds, in the driver that logs them.
+enum class SpeedFilterKind {
+  exponential,  ///< y += (1 − e^{−h/T})(ω − y) with every row: a filter that runs at the rate of the log
+  lag,          ///< T ẏ + y = ω: one that runs much faster than the log
+  mean,         ///< mean of the speeds in the rows of the last T, the newest included
+};
+
+/// Word of the robot file: "exponential", "lag", "mean".
+[[nodiscard]] std::string_view to_string(SpeedFilterKind kind);
+
+/// Filter that wheel speeds passed through before they were logged, while efforts did not. What is linear stays an
+/// equation when both its sides pass through it: efforts are filtered alike.
+struct SpeedFilter {
+  SpeedFilterKind kind = SpeedFilterKind::exponential;
+  int order = 1;       ///< 1, or 2 such filters in a row (exponential)
+  Interval time{};     ///< s, holds T > 0
+  bool found = false;  ///< by a log, not declared
+
+  /// The value that is reckoned with: the middle.
+  [[nodiscard]] double middle() const { return 0.5 * (time.lower + time.upper); }
+  friend bool operator==(const SpeedFilter& a, const SpeedFilter& b) = default;
+};
+
+/// Speeds that a driver cut off to whole multiples of a unit, instead of rounding them: each stands for the middle of
+/// what it may have been, except 0 between two signs.
+struct SpeedCut {
+  double unit = 0.0;  ///< rad/s or m/s, > 0
+  bool down = false;  ///< down instead of towards zero
+  friend bool operator==(const SpeedCut& a, const SpeedCut& b) = default;
 };
 
 /// What a logged pose is.
@@ -121,6 +153,8 @@ struct Robot {
   std::optional<EvenClock> clock;  ///< of the sensors that sample evenly behind scattered stamps (step 0: the stamps
                                    ///< hold); nothing: as the log shows
   SpeedSource speed_source = SpeedSource::automatic;
+  std::optional<SpeedFilter> speed_filter{};  ///< nothing: speeds are not smoothed
+  std::optional<SpeedCut> speed_cut{};        ///< nothing: speeds are not cut off
   PoseSource pose_source = PoseSource::automatic;
   double heading_offset = 0.0;  ///< rad, counterclockwise from the logged heading to the driving direction; readers of
                                 ///< logs add it to `theta`

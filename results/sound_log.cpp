@@ -2,6 +2,7 @@
 #include "results/sound_log.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -44,14 +45,23 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
                     "--despite {} goes on all the same",
                     paths.front().string(), wrong, fmt::join(names, " --despite ")));
   }
-  bool again = false;
-  const doctor::LogFinding* repeats = health.find("signals.pose_repeats_wheels");
-  if (repeats != nullptr && pose == WheelPose::hidden) {
-    std::erase_if(*reader.only,
-                  [&](const std::string& name) { return std::ranges::count(repeats->columns, name) > 0; });
-    out.remarks.push_back(fmt::format("{} It is not used.", repeats->sentence));
-    again = true;
+  for (const doctor::LogFinding& finding : health.findings) {
+    if (finding.speed_filter || finding.speed_cut) {
+      out.robot.speed_filter = finding.speed_filter ? finding.speed_filter : out.robot.speed_filter;
+      out.robot.speed_cut = finding.speed_cut ? finding.speed_cut : out.robot.speed_cut;
+      out.remarks.push_back(fmt::format("{}: {} {}", finding.id, finding.sentence, finding.next));
+    }
   }
+  std::vector<std::string> hidden;
+  for (const doctor::LogFinding& finding : health.findings) {
+    const bool repeats = finding.id == "signals.pose_repeats_wheels" && pose == WheelPose::hidden;
+    if (repeats || finding.hides) {
+      std::ranges::copy(finding.columns, std::back_inserter(hidden));
+      out.remarks.push_back(finding.sentence + (repeats ? " It is not used." : ""));
+    }
+  }
+  bool again = !hidden.empty();
+  std::erase_if(*reader.only, [&](const std::string& name) { return std::ranges::count(hidden, name) > 0; });
   if (const doctor::LogFinding* turned = health.find("units.heading_offset")) {
     out.robot.heading_offset += turned->value;
     if (std::optional<double>& heading = out.robot.noise.heading.value) {

@@ -11,6 +11,7 @@
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
 #include "commission/setting.hpp"
+#include "commission/speed_smoothing.hpp"
 #include "core/error.hpp"
 #include "core/statistics.hpp"
 #include "identify/inference/identifiability.hpp"
@@ -414,6 +415,9 @@ void check_delay(const HealthView& view, const commission::Setting& s, const com
   TableSource source(*view.log);
   const std::optional<commission::EffortTiming> timing = commission::effort_timing(source, s, fit);
   if (!timing) {
+    return;
+  }
+  if (commission::may_be_smoothed(s, *timing) && check_smoothing(view, s, fit, out)) {
     return;
   }
   const double delay = timing->delay, error = timing->standard_error, left = timing->residual_ratio;

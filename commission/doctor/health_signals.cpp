@@ -400,8 +400,8 @@ void check_wrapped(const HealthView& view, const ReaderCounts& reader, std::vect
   if (reader.unwrapped > 0) {
     out.push_back(
         about("signals.wrapped", FindingSeverity::notice, "",
-              fmt::format("Wheel angles jump back by a whole turn {} times: they are wrapped at 2π, and were "
-                          "unwrapped on reading.",
+              fmt::format("Wheel angles jump back {} times by the range of their counter, a turn or more: they are "
+                          "wrapped, and were unwrapped on reading.",
                           reader.unwrapped),
               "Log angles that go on, where the driver has them: a wrapped one is lost where rows are missing.",
               static_cast<double>(reader.unwrapped), "1"));

@@ -382,10 +382,81 @@ const LogFinding* LogHealth::find(std::string_view id) const {
   return at == findings.end() ? nullptr : &*at;
 }
 
+namespace {
+
+constexpr double kMoved = 1.0;  // rad or m, by the other column: a column that did not change meanwhile is dead
+
+// A column of a joint that has one value throughout, while the joint's other column moves.
+bool is_dead(const HealthView& view, const std::vector<double>* column, const std::vector<double>* other, bool angle) {
+  if (column == nullptr || other == nullptr || column->empty()) {
+    return false;
+  }
+  const auto [low, high] = std::ranges::minmax(*column);
+  double way = 0.0;
+  for (std::size_t k = 1; k < other->size(); ++k) {
+    way += angle ? std::abs((*other)[k]) * view.step : std::abs((*other)[k] - (*other)[k - 1]);
+  }
+  return low == high && way > kMoved;
+}
+
+// Angles that stand still beside speeds, of one wheel or of all, or speeds that do beside angles.
+std::optional<LogFinding> dead_columns(const HealthView& view) {
+  for (const bool angle : {true, false}) {
+    std::vector<std::string> dead, names, instead;
+    bool all = true;
+    for (const JointView& j : view.joints) {
+      const auto *column = angle ? j.angle : j.speed, *other = angle ? j.speed : j.angle;
+      all = all && other != nullptr && !is_dead(view, other, column, !angle);
+      if (is_dead(view, column, other, angle)) {
+        dead.push_back(angle ? j.angle_name : j.speed_name);
+      }
+      if (column != nullptr) {
+        names.push_back(angle ? j.angle_name : j.speed_name);
+      }
+      instead.push_back(angle ? j.speed_name : j.angle_name);
+    }
+    if (all && !dead.empty()) {
+      return LogFinding{.id = angle ? "signals.position_zero" : "signals.speed_zero",
+                        .topic = FindingTopic::signals,
+                        .severity = FindingSeverity::warning,
+                        .sentence = fmt::format("{} never change{} while {} move: {} taken, {} not read.",
+                                                core::listed(dead), dead.size() == 1 ? "s" : "", core::listed(instead),
+                                                instead.size() == 1 ? "that is" : "these are",
+                                                names.size() == 1 ? "it is" : "the others are"),
+                        .next = "Fill the field in the driver, or leave the columns out of the log.",
+                        .columns = names,
+                        .hides = true};
+    }
+  }
+  return std::nullopt;
+}
+
+LogTable without(const LogTable& log, const std::vector<std::string>& names) {
+  LogTable kept;
+  kept.t = log.t;
+  kept.segment_starts = log.segment_starts;
+  for (std::size_t c = 0; c < log.names.size(); ++c) {
+    if (std::ranges::count(names, log.names[c]) == 0) {
+      kept.names.push_back(log.names[c]);
+      kept.columns.push_back(log.columns[c]);
+    }
+  }
+  return kept;
+}
+
+}  // namespace
+
 LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, const ReaderCounts& reader,
                   std::size_t threads) {
+  const HealthView as_stamped = make_view(stamped, robot);
+  if (auto dead = dead_columns(as_stamped)) {
+    LogHealth health = examine(without(stamped, dead->columns), robot, reader, threads);
+    health.findings.push_back(std::move(*dead));
+    conclude(as_stamped, health.verdict == LogVerdict::commission, health);
+    return health;
+  }
   LogHealth health;
-  health.clock = check_clock(make_view(stamped, robot), health.findings);
+  health.clock = check_clock(as_stamped, health.findings);
   const std::optional<LogTable> even =
       health.clock ? std::optional(core::read_evenly(stamped, *health.clock)) : std::nullopt;
   const LogTable& log = even ? *even : stamped;
@@ -406,10 +477,11 @@ LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, co
         threads,
         [&] {
           check_signals(view, reader, health.findings);
+          check_rounding(view, health.findings);
           check_odometry(view, health.findings);
           check_gyro_delay(view, health.findings);
         },
-        [&] { reaches_bounds = check_motion(view, of_motion); });
+        [&] { reaches_bounds = !check_direction(view, of_motion) && check_motion(view, of_motion); });
     std::ranges::move(of_motion, std::back_inserter(health.findings));
   }
   conclude(view, reaches_bounds, health);

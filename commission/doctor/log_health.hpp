@@ -15,6 +15,11 @@
 #include "core/log.hpp"
 #include "model/robot.hpp"
 
+namespace wheelwright::commission {
+struct Fit;
+struct Setting;
+}  // namespace wheelwright::commission
+
 namespace wheelwright::doctor {
 
 /// Severity of a finding, the least first.
@@ -48,6 +53,10 @@ struct LogFinding {
   std::vector<Interval> when{};     ///< stretches of the log, s of log time: the first kMostStretches
   std::size_t stretches = 0;        ///< how many there are altogether; 0: everywhere, or nowhere in particular
   bool refuses = false;  ///< a fatal one: no command makes a model of the log, as for every fatal one of units
+
+  bool hides = false;  ///< no command reads its columns, and the rest was examined without them
+  std::optional<model::SpeedFilter> speed_filter{};  ///< with which every command reads the log
+  std::optional<model::SpeedCut> speed_cut{};        ///< likewise
 
   /// True if commands that make something of a log refuse it for this (results/sound_log.hpp).
   [[nodiscard]] bool is_refusal() const {
@@ -164,6 +173,15 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings);
 /// Lag of the gyro behind the yaw rate that the wheels show, and how it drifts from the first to the last third of the
 /// log.
 void check_gyro_delay(const HealthView& view, std::vector<LogFinding>& findings);
+/// Speeds and angles without a direction of their own: at reversals they jump, or bounce off zero. Returns whether any
+/// was found: nothing can be fitted to them.
+bool check_direction(const HealthView& view, std::vector<LogFinding>& findings);
+/// Speeds in whole multiples of a unit that no encoder makes, rounded or cut off.
+void check_rounding(const HealthView& view, std::vector<LogFinding>& findings);
+/// Efforts that are early because speeds passed through a low-pass filter, in this setting with its fit. Returns
+/// whether that, or that it cannot be told from a delay, was said.
+bool check_smoothing(const HealthView& view, const commission::Setting& setting, const commission::Fit& fit,
+                     std::vector<LogFinding>& findings);
 /// Wheel angles against speeds, wheels against pose and gyro: scales, signs, sides.
 void check_odometry(const HealthView& view, std::vector<LogFinding>& findings);
 

@@ -107,8 +107,11 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds, bool sums
       kernel_(filter.design(), measurement_.motion, measurement_.nominal_step) {
   if (!measurement_.correction.empty()) {
     throw InputError(
-        "export: the robot's effects correct the measured efforts (lag, delay, gain, dead zone or saturation), which "
-        "has no C form; expected a model without such effects");
+        "export: the robot's effects or the filter of its speeds correct the measured efforts (lag, delay, gain, dead "
+        "zone, saturation or speed_filter), which has no C form; expected a model without them");
+  }
+  if (measurement_.cut) {
+    throw InputError("export: speeds that are cut off have no C form; expected a model without `speed_cut`");
   }
   if (measurement_.delay.lower != 0.0 || measurement_.delay.upper != 0.0) {
     throw InputError(fmt::format(

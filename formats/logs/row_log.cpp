@@ -30,24 +30,57 @@ double WheelAngle::follow(double time, double angle, bool predict) {
   keep(time, angle);
   const bool known = predict && std::isfinite(rate_);
   const double expected = known ? rate_ * seconds : 0.0;
-  double turns = -std::round(step / turn);
+  double turns = -std::round(step / turn_);
   if (!wrapped_) {
     const bool jump = known && turns != 0.0 && most_ - least_ <= turn + slack &&
-                      std::abs(step + turns * turn - expected) < 0.25 * turn;
+                      std::abs(step + turns * turn_ - expected) < 0.25 * turn_;
     wrapped_ = jump;
     turns = jump ? turns : 0.0;
   } else if (known) {
-    const double nearest = std::round((expected - step) / turn);
-    turns = std::abs(step + nearest * turn - expected) < 0.25 * turn ? nearest : turns;
+    const double nearest = std::round((expected - step) / turn_);
+    turns = std::abs(step + nearest * turn_ - expected) < 0.25 * turn_ ? nearest : turns;
   }
   jumped_ = turns != 0.0;
-  broken_ = known && std::abs(step + turns * turn - expected) > std::max(0.5 * turn, most_change * seconds);
+  broken_ = known && std::abs(step + turns * turn_ - expected) > std::max(0.5 * turn, most_change * seconds);
+  if (broken_ && !wrapped_) {
+    learn_range(step, expected);
+    turns = wrapped_ ? std::round((expected - step) / turn_) : 0.0;
+    jumped_ = wrapped_;
+    broken_ = !wrapped_;
+  }
+  const double moved = std::abs(step + turns * turn_);
+  count_ = moved > 1e-9 && !broken_ ? std::min(count_, moved) : count_;
   turns_ += turns;
-  rate_ = (step + turns * turn) / seconds;
+  rate_ = (step + turns * turn_) / seconds;
   return value();
 }
 
-double WheelAngle::value() const { return before_ + turns_ * turn; }
+// A second jump of one size, of an angle that never leaves a range as wide.
+void WheelAngle::learn_range(double step, double expected) {
+  constexpr double slack = 1e-3, exact = 0.05;
+  const double jump = std::abs(expected - step), about = 0.5 * std::abs(expected) + slack;
+  const bool again = std::abs(jump - jump_) < about && most_ - least_ <= jump + 2.0 * about;
+  jump_ = jump;
+  if (!again) {
+    return;
+  }
+  const double turns = std::round(jump / turn);
+  if (turns >= 1.0 && std::abs(jump - turns * turn) < about) {
+    turn_ = turns * turn;
+    wrapped_ = true;
+    return;
+  }
+  const double counts = turn / count_, whole = std::round(counts);
+  for (const double range : {0x1p16, 0x1p32}) {
+    if (whole >= 1.0 && std::abs(counts - whole) < exact && std::abs(jump - range * count_) < about) {
+      turn_ = range * turn / whole;
+      wrapped_ = true;
+      return;
+    }
+  }
+}
+
+double WheelAngle::value() const { return before_ + turns_ * turn_; }
 
 double WheelAngle::begin(double time, double angle) {
   keep(time, angle);

@@ -9,6 +9,7 @@
 #include <deque>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <span>
 #include <string>
 #include <string_view>
@@ -29,7 +30,8 @@ enum class RowOutcome {
 /// A wheel angle that may be wrapped, made continuous. It counts as wrapped from the first jump on that nothing else
 /// explains: by more than half a turn, while all values so far lie within one turn, and with the turn taken away within
 /// a quarter of a turn of where the last step leads. From then on every step is the one that is closest to the
-/// last, per second, or the shortest where none of them is within a quarter of a turn of it.
+/// last, per second, or the shortest where none of them is within a quarter of a turn of it. The same for the range of
+/// a counter, some turns or 2^16 or 2^32 counts of which a whole number make a turn, from its second jump on.
 class WheelAngle {
  public:
   /// `angle` (rad) at `time` (s), later than the last one, with the turns that were undone. `predict` is false where so
@@ -49,10 +51,14 @@ class WheelAngle {
 
  private:
   void keep(double time, double angle);
+  void learn_range(double step, double expected);
 
   double time_ = std::numeric_limits<double>::quiet_NaN();
-  double before_ = 0.0;  // as logged
-  double turns_ = 0.0;   // to add
+  double before_ = 0.0;                                     // as logged
+  double turns_ = 0.0;                                      // to add
+  double turn_ = 2.0 * std::numbers::pi;                    // rad, by which it wraps
+  double jump_ = 0.0;                                       // rad, the last one that no wheel turns
+  double count_ = std::numeric_limits<double>::infinity();  // rad, the smallest step
   double least_ = std::numeric_limits<double>::infinity(), most_ = -least_;
   double rate_ = std::numeric_limits<double>::quiet_NaN();  // of the last step, rad/s
   bool wrapped_ = false, jumped_ = false, broken_ = false;

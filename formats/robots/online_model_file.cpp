@@ -231,7 +231,10 @@ Measurement measurement_at(const JsonPlace& place, const Model& model, const Rob
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
   m.clock_drift = robot.clock ? robot.clock->drift : 0.0;
-  m.correction = filter::effort_correction(robot);
+  m.correction = filter::effort_correction(robot, m.motion != MotionKind::angle);
+  if (m.motion == MotionKind::speed) {
+    m.cut = robot.speed_cut;
+  }
   if (m.motion_columns.size() != model.joints.size() || m.effort_columns.size() != model.joints.size()) {
     place.fail("one motion column and one effort column for each joint of the model");
   }

@@ -58,7 +58,8 @@ struct RobotReader {
                                        "effort",         "nominal",
                                        "prior",          "noise",
                                        "filter",         "encoder_counts_per_turn",
-                                       "speed_source",   "pose_source",
+                                       "speed_source",   "speed_filter",
+                                       "speed_cut",      "pose_source",
                                        "heading_offset", "limits",
                                        "kinematic",      "motor",
                                        "effects",        "columns",
@@ -211,12 +212,62 @@ struct RobotReader {
       robot.encoder_counts_per_turn = place.positive();
     } else if (key == "speed_source") {
       robot.speed_source = static_cast<model::SpeedSource>(place.choice({"auto", "encoder_difference", "measured"}));
+    } else if (key == "speed_filter") {
+      read_speed_filter(place);
+    } else if (key == "speed_cut") {
+      model::SpeedCut cut;
+      for (const auto& [name, value] : place.members({"unit", "towards"})) {
+        if (name == "unit") {
+          cut.unit = value.positive();
+        } else {
+          cut.down = value.choice({"zero", "below"}) == 1;
+        }
+      }
+      if (!(cut.unit > 0.0)) {
+        place.fail("the key unit");
+      }
+      robot.speed_cut = cut;
     } else if (key == "pose_source") {
       robot.pose_source = static_cast<model::PoseSource>(place.choice({"auto", "independent"}));
     } else if (key == "heading_offset") {
       robot.heading_offset =
           place.number("an angle in rad, between -3.2 and 3.2", [](double value) { return std::abs(value) <= 3.2; });
     }
+  }
+
+  void read_speed_filter(const YamlPlace& place) {
+    constexpr std::string_view expected = "seconds > 0 and at most 1, or two such numbers [lo, hi] with lo <= hi";
+    const auto seconds = [&](const YamlPlace& end) {
+      return end.number(expected, [](double value) { return value > 0.0 && value <= longest_delay; });
+    };
+    model::SpeedFilter filter;
+    for (const auto& [name, value] : place.members({"kind", "order", "time", "found"})) {
+      if (name == "kind") {
+        filter.kind = static_cast<model::SpeedFilterKind>(value.choice({"exponential", "lag", "mean"}));
+      } else if (name == "order") {
+        filter.order = 1 + static_cast<int>(value.choice({"1", "2"}));
+      } else if (name == "found") {
+        filter.found = value.boolean();
+      } else if (value.is_scalar()) {
+        filter.time.lower = filter.time.upper = seconds(value);
+      } else {
+        const auto ends = value.elements(expected);
+        if (ends.size() != 2) {
+          value.fail(expected);
+        }
+        filter.time = {seconds(ends[0]), seconds(ends[1])};
+        if (filter.time.lower > filter.time.upper) {
+          ends[1].fail(expected);
+        }
+      }
+    }
+    if (!(filter.time.lower > 0.0)) {
+      place.fail("the key time");
+    }
+    if (filter.order == 2 && filter.kind != model::SpeedFilterKind::exponential) {
+      place.fail("order 1, or kind exponential");
+    }
+    robot.speed_filter = filter;
   }
 
   static Interval delay(const YamlPlace& place) {
@@ -492,6 +543,17 @@ Json to_json(const Robot& robot) {
         robot.clock->step > 0.0 ? Json{{"step", robot.clock->step}, {"drift", robot.clock->drift}} : Json("stamps");
   }
   out["speed_source"] = sources[static_cast<std::size_t>(robot.speed_source)];
+  if (robot.speed_filter) {
+    constexpr std::array filters = {"exponential", "lag", "mean"};
+    const model::SpeedFilter& filter = *robot.speed_filter;
+    out["speed_filter"] = {{"kind", filters[static_cast<std::size_t>(filter.kind)]},
+                           {"order", filter.order},
+                           {"time", Json::array({filter.time.lower, filter.time.upper})},
+                           {"found", filter.found}};
+  }
+  if (robot.speed_cut) {
+    out["speed_cut"] = {{"unit", robot.speed_cut->unit}, {"towards", robot.speed_cut->down ? "below" : "zero"}};
+  }
   if (robot.pose_source == model::PoseSource::independent) {
     out["pose_source"] = "independent";
   }

@@ -61,7 +61,7 @@ ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors 
   }
   enclosure_ = StepEnclosure(model_, errors_.between_samples ? errors_.motion : MotionBound{});
   const Eigen::VectorXd joint_zero = Eigen::VectorXd::Zero(joints), output_zero = Eigen::VectorXd::Zero(n);
-  ring_.assign(ahead_ + back, Sample{0.0, joint_zero, joint_zero, joint_zero, 0.0});
+  ring_.assign(ahead_ + back, Sample{0.0, joint_zero, joint_zero, joint_zero, joint_zero, 0.0});
   speed_ = speed_before_ = Eigen::VectorXd::Zero(coordinates);
   joint_speed_ = low_ = high_ = scratch_ = falling_in_ = rising_in_ = joint_zero;
   steps_.fill(StepMotion(model_));
@@ -97,6 +97,10 @@ void ElementFilter::read(double t, std::span<const double> sample) {
   for (Eigen::Index j = 0; j < now.joint.size(); ++j) {
     const double value = sample[static_cast<std::size_t>(j)];
     now.joint[j] = measurement_.count > 0.0 ? std::round(value / measurement_.count) * measurement_.count : value;
+    if (measurement_.cut) {
+      const double half = 0.5 * measurement_.cut->unit;
+      now.joint[j] += measurement_.cut->down ? half : std::abs(value) < half ? 0.0 : std::copysign(half, value);
+    }
   }
   now.heading = measurement_.heading_column.empty() ? 0.0 : sample.back();
   read_effort(now, sample);
@@ -125,6 +129,7 @@ void ElementFilter::read_effort(Sample& now, std::span<const double> sample) {
     const auto i = static_cast<Eigen::Index>(j);
     now.over[i] = corrector_.mean(j);  // what acted since the last sample is known now
     now.effort[i] = corrector_.now(j);
+    now.doubt[i] = corrector_.doubt(j);
   }
 }
 
@@ -224,6 +229,12 @@ bool ElementFilter::measure_effort(std::size_t age) {
     alike = between;
   }
   StepEffort& e = present_effort();
+  each(joints, [&](Eigen::Index j) {
+    scratch_[j] = mean ? std::max(now.doubt[j], sample(age - 1).doubt[j]) : now.doubt[j];
+    low_[j] -= scratch_[j];
+    high_[j] += scratch_[j];
+  });
+  multiply_sizes(model_.input, scratch_, e.doubt);
   multiply(model_.input, falling_in_, e.falling);
   if (alike) {
     each(e.rising.size(), [&](Eigen::Index i) { e.rising[i] = e.falling[i]; });
@@ -234,7 +245,7 @@ bool ElementFilter::measure_effort(std::size_t age) {
   multiply_sizes(model_.input, scratch_, effort_change_);
   Eigen::VectorXd& largest = present().effort;
   each(e.doubt.size(), [&](Eigen::Index i) {
-    e.doubt[i] = hull ? effort_change_[i] : 0.0;
+    e.doubt[i] = hull ? effort_change_[i] : e.doubt[i];
     largest[i] = std::abs(e.falling[i] + e.rising[i]) + effort_change_[i] + errors_.motion.effort[i];
   });
   return effort_is_covered(mean ? now.t + 0.5 * present().length : now.t);

@@ -105,6 +105,7 @@ class ElementFilter {
     Eigen::VectorXd joint;
     Eigen::VectorXd effort;  // at the stamp
     Eigen::VectorXd over;    // held efforts: what acts in the step that ends at the stamp
+    Eigen::VectorXd doubt;   // of a corrected effort in the step that ends at the stamp
     double heading = 0.0;
   };
   // Integrals of a step's effort with weights that fall from 1 to 0 and rise from 0 to 1, over its length; doubt alike.

@@ -65,6 +65,19 @@ bool is_decimal(double quantum, double near) {
   return std::ranges::any_of(std::vector{1.0, 2.0, 5.0}, [&](double d) { return std::abs(scaled / d - 1.0) < near; });
 }
 
+// The whole number that `counts`, known to ±`doubt`, is taken for: a power of two, else a whole hundred, where one is
+// as near as that, else the nearest.
+double whole_counts(double counts, double doubt) {
+  const double power = std::exp2(std::round(std::log2(counts))), hundred = 100.0 * std::round(counts / 100.0);
+  for (const double round : {power, hundred}) {
+    if (round > 0.0 && std::abs(counts - round) <= doubt) {
+      return round;
+    }
+  }
+  return std::round(counts);
+}
+
+constexpr double kClock = 2e-4;  // relative error of the step that a driver divides by, and a log shows
 constexpr double kNearDecimal = 1e-6;
 constexpr double kNearRpm = 1e-4;  // printed decimals blur a quantum that is no decimal number itself
 constexpr double kRpm = 2.0 * std::numbers::pi / 60.0;
@@ -103,11 +116,13 @@ std::optional<EncoderFinding> search(std::span<const double> speeds, double step
         (!of_angles && is_decimal(quantum / kRpm, kNearRpm))) {
       return std::nullopt;
     }
-    const double whole = turn_over(std::round(counts), step);
-    double found = std::round(counts);
-    if (worst_rounding(magnitudes, whole) < kMostRounding) {
+    const double most = std::round(magnitudes.back() / quantum);
+    const double doubt = counts * (worst_rounding(magnitudes, quantum) / most + (of_angles ? 0.0 : kClock));
+    double found = whole_counts(counts, doubt);
+    const double whole = turn_over(found, step);
+    if (found == std::round(counts) && worst_rounding(magnitudes, whole) < kMostRounding) {
       quantum = whole;
-    } else {
+    } else if (found == std::round(counts)) {
       found = counts;
     }
     const double rounding = worst_rounding(magnitudes, quantum);

@@ -115,7 +115,6 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   m.effort_unsigned = robot.effort_unsigned;
   m.nominal_step = log.median_step();
   m.shortest_step = shortest_step_of(log);
-  m.correction = effort_correction(robot);
 
   std::vector<std::string> angles, speeds;
   for (const model::Joint& joint : model.joints) {
@@ -155,6 +154,10 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
     } else if (robot.speed_source == model::SpeedSource::encoder_difference) {
       m.motion = MotionKind::mean_speed;
     }
+  }
+  m.correction = effort_correction(robot, m.motion != MotionKind::angle);
+  if (m.motion == MotionKind::speed) {
+    m.cut = robot.speed_cut;
   }
   if (model.heading_used && log.find("theta")) {
     m.heading_column = "theta";

@@ -55,6 +55,8 @@ struct Measurement {
   double unused_count = 0.0;  ///< speed: what `count` would be if the declared bound of the speeds did not stand above
                               ///< it, rad/s (0: nothing was found)
 
+  std::optional<model::SpeedCut> cut{};  ///< speed: half of its unit is given back
+
   EffortCorrection correction{};  ///< of the efforts, before anything else is made of them
   model::EffortChanges changes =
       model::EffortChanges::between;  ///< what an effort may do between two samples, beside `hold`

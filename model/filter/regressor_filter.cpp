@@ -152,11 +152,12 @@ void RegressorFilter::write_row() {
       dY[k] += drift * (2.0 + drift) * std::abs(Y[k]);
     }
   }
+  const bool corrected = !elements_.corrector().empty();  // its doubt is no matter of what happens between samples
   const double area = bounded ? std::max(1.0, out[area_] / static_gain_) : 1.0;
   for (Eigen::Index i = 0; i < row_.y.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     row_.y[i] = out[torque_ + k];
-    row_.dy[i] = area * errors.output[i] + (bounded ? out[torque_doubt_ + k] : 0.0);
+    row_.dy[i] = area * errors.output[i] + (bounded || corrected ? out[torque_doubt_ + k] : 0.0);
   }
 }
 

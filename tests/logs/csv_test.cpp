@@ -357,7 +357,39 @@ TEST_F(Csv, WheelAnglesThatAreNotWrappedStayAsTheyAre) {
   EXPECT_THAT(table.segment_starts, ElementsAre(0u, 100u));
 }
 
-// Drives that wrap at ±12.5 rad or at two turns, degrees, and a counter that is set behind its first sample.
+// The range of a counter: some turns, 2^16 or 2^32 counts. The first jump could be a counter that was set back.
+TEST_F(Csv, AWheelAngleWrappedAtTheRangeOfItsCounterIsUnwrappedFromTheSecondJumpOn) {
+  struct Counter {
+    double counts, range;  // a turn, in counts
+  };
+  for (const auto& [counts, range] : {Counter{4096.0, 0x1p16}, Counter{500.0, 0x1p16}, Counter{360.0, 1440.0},
+                                      Counter{32768.0, 0x1p16}, Counter{1e7, 0x1p32}}) {
+    for (const double sign : {1.0, -1.0}) {
+      const double count = 2.0 * std::numbers::pi / counts;
+      std::string text = "t,phi_r,phi_l\n";
+      std::vector<double> truth;
+      const double fast = range * count / 40.0;  // a wrap in 40 rows: turns a row are no matter here
+      double angle = 0.3 * range * count, t = 0.0;
+      for (int k = 0; k < 400; ++k, t += 1.0) {
+        angle += k % 50 == 0 ? sign * count : sign * fast * (1.0 + 0.002 * std::sin(0.1 * k));
+        const double whole = std::floor(angle / count);
+        truth.push_back(whole * count);
+        text += fmt::format("{},{:.12g},0\n", t * fast / 20.0, (whole - range * std::floor(whole / range)) * count);
+      }
+      const LogTable table = read(text);
+      EXPECT_EQ(report.jumps.count, 1u) << counts << ' ' << range;
+      ASSERT_EQ(table.segment_starts.size(), 2u);
+      const std::size_t first = table.segment_starts[1];
+      for (std::size_t k = first; k < table.rows(); ++k) {
+        ASSERT_NEAR(table.column("phi_r")[k] - table.column("phi_r")[first], truth[k] - truth[first],
+                    1e-9 * std::abs(truth[k]))
+            << counts << ' ' << k;
+      }
+    }
+  }
+}
+
+// Drives that wrap at ±12.5 rad or at 27 rad, degrees, and a counter that is set behind its first sample.
 TEST_F(Csv, AWheelAngleThatJumpsAsNoWheelTurnsBeginsASegment) {
   const auto wrapped = [](double angle, double from, double period) {
     return angle - period * std::floor((angle - from) / period);
@@ -369,7 +401,7 @@ TEST_F(Csv, AWheelAngleThatJumpsAsNoWheelTurnsBeginsASegment) {
     }
     return read(text);
   };
-  for (const auto& [from, period] : {std::pair{-12.5, 25.0}, std::pair{0.0, 8.0 * std::numbers::pi}}) {
+  for (const auto& [from, period] : {std::pair{-12.5, 25.0}, std::pair{0.0, 27.0}}) {
     const LogTable table = rows([&](double t) { return wrapped(-20.0 * t - 1.0, from, period); });
     EXPECT_EQ(report.jumps.count, table.segment_starts.size() - 1) << period;
     EXPECT_GE(report.jumps.count, 3u) << period;

@@ -29,6 +29,8 @@ noise:   {wheel_speed: 0.02, effort: estimate, position: 0.002, wheel_angle: 1.0
 filter:  {order: 2, alpha: 20, beta: 25}
 encoder_counts_per_turn: 4096
 speed_source: encoder_difference
+speed_filter: {kind: mean, time: [0.04, 0.05], found: true}
+speed_cut: {unit: 0.1, towards: below}
 pose_source: independent
 limits:  {effort: 6.0, speed: 2}
 motor: {torque_constant: 0.0105, resistance: 3.3, back_emf: 0.0105, gear_ratio: 9.69}
@@ -62,6 +64,9 @@ TEST(RobotFile, ReadsEveryKey) {
   EXPECT_EQ(robot.encoder_counts_per_turn, 4096.0);
   EXPECT_EQ(robot.speed_source, model::SpeedSource::encoder_difference);
   EXPECT_EQ(robot.pose_source, model::PoseSource::independent);
+  EXPECT_EQ(robot.speed_filter,
+            (model::SpeedFilter{.kind = model::SpeedFilterKind::mean, .time = {0.04, 0.05}, .found = true}));
+  EXPECT_EQ(robot.speed_cut, (model::SpeedCut{.unit = 0.1, .down = true}));
   EXPECT_EQ(robot.limits.at("effort"), 6.0);
   EXPECT_EQ(robot.limits.at("speed"), 2.0);
   EXPECT_EQ(robot.motor.value().gear_ratio, 9.69);
@@ -212,6 +217,10 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"filter: {order: 1.5}", "filter.order: '1.5': expected 1, 2 or auto"},
         Bad{"filter: {alpha: 0}", "filter.alpha: '0': expected a rate > 0 in 1/s, or auto"},
         Bad{"encoder_counts_per_turn: 0", "encoder_counts_per_turn: '0': expected a number > 0"},
+        Bad{"speed_filter: {kind: lag}", "speed_filter: expected the key time"},
+        Bad{"speed_filter: {time: 20}", "speed_filter.time: '20': expected seconds > 0 and at most 1"},
+        Bad{"speed_filter: {time: [0.03, 0.02]}", "speed_filter.time: '0.02': expected seconds > 0 and at most 1"},
+        Bad{"speed_cut: {towards: up}", "speed_cut.towards: 'up': expected one of zero, below"},
         Bad{"pose_source: wheels", "pose_source: 'wheels': expected one of auto, independent"},
         Bad{"speed_source: encoder", "speed_source: 'encoder': expected one of auto, encoder_difference, measured"},
         Bad{"limits: {torque: 3}", "limits: unknown key 'torque': expected one of effort, speed, acceleration"},

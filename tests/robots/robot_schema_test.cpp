@@ -41,6 +41,8 @@ TEST(RobotSchema, CoversWhatIsWritten) {
   robot.filter.order = 2;
   robot.encoder_counts_per_turn = 4096.0;
   robot.pose_source = model::PoseSource::independent;
+  robot.speed_filter = {.time = {0.02, 0.03}};
+  robot.speed_cut = {.unit = 0.1};
   robot.limits["effort"] = 1.0;
   robot.motor.emplace();
   robot.kinematic_window = 0.5;

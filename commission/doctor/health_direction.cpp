@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "commission/doctor/log_health.hpp"
+#include "core/statistics.hpp"
+
+namespace wheelwright::doctor {
+namespace {
+
+constexpr double kLeastCounts = 10.0;   // that the top speed makes in the span of a difference
+constexpr double kLeastSpan = 0.02;     // s, of a difference of angles
+constexpr double kSlowest = 0.1;        // of the top speed: slower is a reversal or rest
+constexpr double kLongestDip = 0.6;     // s below it, between two stretches of a drive that goes on
+constexpr double kShortestPiece = 0.3;  // s
+constexpr double kExplained = 0.8;      // share of the efforts that motion with a sign for each stretch must explain
+constexpr std::size_t kLeastReversals = 3;  // reversals
+constexpr double kUsualChange = 0.95;       // quantile of changes from row to row
+constexpr double kJump = 2.0;               // of the usual change, on both sides of zero
+constexpr double kTimesTheEffort = 3.0;     // what a jump would take, over the largest effort about it
+
+double rank_of(std::vector<double> values, double q) {
+  if (values.empty()) {
+    return 0.0;
+  }
+  const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1));
+  return core::order_statistic(std::move(values), rank);
+}
+
+// Mean speed of `joint` over `span` rows before row k and over as many from it on, by column; of one segment.
+struct Sides {
+  double before = 0.0, after = 0.0;
+};
+Sides sides_of(const HealthView& view, const std::vector<double>& column, bool angle, std::size_t k, std::size_t span) {
+  const std::vector<double>& t = view.log->t;
+  if (angle) {
+    return {(column[k] - column[k - span]) / (t[k] - t[k - span]),
+            (column[k + span] - column[k]) / (t[k + span] - t[k])};
+  }
+  Sides s;
+  for (std::size_t i = 0; i < span; ++i) {
+    s.before += column[k - 1 - i] / static_cast<double>(span);
+    s.after += column[k + i] / static_cast<double>(span);
+  }
+  return s;
+}
+
+// Rows over which a count of an angle is no more than a tenth of the top speed.
+std::size_t span_of(const HealthView& view, const JointView& joint, const std::vector<double>& column, bool angle) {
+  if (!angle || !(joint.top > 0.0)) {
+    return 1;
+  }
+  double count = 0.0;
+  for (std::size_t k = 1; k < column.size(); ++k) {
+    const double step = std::abs(column[k] - column[k - 1]);
+    count = step > 1e-9 && (count == 0.0 || step < count) ? step : count;
+  }
+  const double seconds = std::max(kLeastSpan, kLeastCounts * count / joint.top);
+  return static_cast<std::size_t>(std::max(1.0, std::ceil(seconds / view.step)));
+}
+
+// Rows at which the speed jumps from one value to its opposite, as nothing that the efforts could do.
+std::vector<std::size_t> jumps_of_sign(const HealthView& view, const JointView& joint,
+                                       const std::vector<double>& column, bool angle, std::size_t& crossings) {
+  const std::size_t span = span_of(view, joint, column, angle);
+  const auto each = [&](auto&& visit) {
+    for (const auto& [first, last] : view.segments) {
+      for (std::size_t k = first + span; k + span < last; ++k) {
+        visit(k, sides_of(view, column, angle, k, span));
+      }
+    }
+  };
+  std::vector<double> changes;
+  each([&](std::size_t, const Sides& s) { changes.push_back(std::abs(std::abs(s.after) - std::abs(s.before))); });
+  const double usual = rank_of(std::move(changes), kUsualChange);
+  const auto jumps = [&](const Sides& s) {
+    return s.before * s.after < 0.0 && std::min(std::abs(s.before), std::abs(s.after)) > kJump * usual &&
+           std::abs(std::abs(s.after) - std::abs(s.before)) < kJump * usual;
+  };
+  double ea = 0.0, aa = 0.0;
+  each([&](std::size_t k, const Sides& s) {
+    if (s.before * s.after > 0.0) {
+      const double change = s.after - s.before;
+      ea += (*joint.effort)[k] * change;
+      aa += change * change;
+    }
+  });
+  const double per_change = aa > 0.0 ? ea / aa : 0.0;  // effort that changes the speed by one unit from row to row
+  std::vector<std::size_t> found;
+  double side = 0.0;  // of the last speed that was not slow
+  crossings = 0;
+  each([&](std::size_t k, const Sides& s) {
+    if (std::abs(s.after) > kSlowest * joint.top) {
+      crossings += side * s.after < 0.0 ? 1 : 0;
+      side = s.after;
+    }
+    if (!jumps(s)) {
+      return;
+    }
+    double largest = 0.0;
+    for (std::size_t i = k - span; i <= k + span; ++i) {
+      largest = std::max(largest, std::abs((*joint.effort)[i]));
+    }
+    const bool taken = std::abs(per_change * (s.after - s.before)) < kTimesTheEffort * largest;
+    if (!taken && (found.empty() || k > found.back() + 2 * span)) {
+      found.push_back(k);
+    }
+  });
+  return found;
+}
+
+// A stretch between two touches of zero.
+struct Piece {
+  std::size_t first = 0, last = 0;
+  double ea = 0.0, ev = 0.0, ee = 0.0, aa = 0.0, av = 0.0, vv = 0.0;
+  double sign = 1.0;
+};
+
+std::vector<Piece> pieces_of(const HealthView& view, const JointView& joint, const std::vector<double>& column,
+                             bool angle, std::size_t span, double top) {
+  std::vector<Piece> pieces;
+  for (const auto& [first, last] : view.segments) {
+    bool open = false;
+    for (std::size_t k = first + span; k + span < last; ++k) {
+      const Sides s = sides_of(view, column, angle, k, span);
+      const double v = 0.5 * (s.before + s.after), a = (s.after - s.before) / (static_cast<double>(span) * view.step);
+      if (v < kSlowest * top) {
+        open = false;
+        continue;
+      }
+      if (!open) {
+        pieces.push_back({.first = k});
+        open = true;
+      }
+      Piece& p = pieces.back();
+      const double e = (*joint.effort)[k];
+      p.last = k;
+      p.ea += e * a;
+      p.ev += e * v;
+      p.ee += e * e;
+      p.aa += a * a;
+      p.av += a * v;
+      p.vv += v * v;
+    }
+  }
+  std::erase_if(pieces, [&](const Piece& p) { return view.log->t[p.last] - view.log->t[p.first] < kShortestPiece; });
+  return pieces;
+}
+
+// e = s (A a + F v) with one sign s a piece: the share of e that is explained.
+double fit_signs(std::vector<Piece>& pieces, bool free) {
+  double ee = 0.0, aa = 0.0, av = 0.0, vv = 0.0, ea = 0.0;
+  for (Piece& p : pieces) {
+    ee += p.ee;
+    aa += p.aa;
+    av += p.av;
+    vv += p.vv;
+    p.sign = free && p.ea < 0.0 ? -1.0 : 1.0;
+  }
+  const double det = aa * vv - av * av;
+  if (!(det > 0.0) || !(ee > 0.0)) {
+    return 0.0;
+  }
+  double explained = 0.0;
+  for (int pass = 0; pass < (free ? 10 : 1); ++pass) {
+    double ev = 0.0;
+    ea = 0.0;
+    for (const Piece& p : pieces) {
+      ea += p.sign * p.ea;
+      ev += p.sign * p.ev;
+    }
+    const double A = (ea * vv - ev * av) / det, F = (ev * aa - ea * av) / det;
+    explained = (A * ea + F * ev) / ee;
+    for (Piece& p : pieces) {
+      p.sign = free && A * p.ea + F * p.ev < 0.0 ? -1.0 : 1.0;
+    }
+  }
+  return explained;
+}
+
+// Rows at which a speed that is never negative bounces off zero while its effort goes on as through a reversal.
+std::vector<std::size_t> bounces(const HealthView& view, const JointView& joint, const std::vector<double>& column,
+                                 bool angle) {
+  const std::size_t span = std::max(span_of(view, joint, column, angle),
+                                    static_cast<std::size_t>(std::max(1.0, std::round(0.05 / view.step))));
+  std::vector<double> speeds;
+  std::size_t back = 0;
+  for (const auto& [first, last] : view.segments) {
+    for (std::size_t k = first + span; k + span < last; ++k) {
+      const Sides s = sides_of(view, column, angle, k, span);
+      speeds.push_back(0.5 * (s.before + s.after));
+    }
+  }
+  const double top = rank_of(speeds, 0.99);
+  back = static_cast<std::size_t>(std::ranges::count_if(speeds, [&](double v) { return v < -0.05 * top; }));
+  if (!(top > 0.0) || 200 * back > speeds.size()) {
+    return {};
+  }
+  std::vector<Piece> pieces = pieces_of(view, joint, column, angle, span, top);
+  const double as_logged = fit_signs(pieces, false), with_signs = fit_signs(pieces, true);
+  if (with_signs < kExplained || 1.0 - as_logged < 2.0 * (1.0 - with_signs)) {
+    return {};
+  }
+  std::vector<std::size_t> found;
+  std::size_t same = 0;
+  for (std::size_t i = 1; i < pieces.size(); ++i) {
+    if (view.log->t[pieces[i].first] - view.log->t[pieces[i - 1].last] > kLongestDip) {
+      continue;
+    }
+    if (pieces[i].sign != pieces[i - 1].sign) {
+      found.push_back((pieces[i].first + pieces[i - 1].last) / 2);
+    } else {
+      ++same;
+    }
+  }
+  return found.size() >= kLeastReversals && found.size() > same ? found : std::vector<std::size_t>{};
+}
+
+}  // namespace
+
+bool check_direction(const HealthView& view, std::vector<LogFinding>& findings) {
+  if (!view.has_motion() || !view.has_effort() || view.robot.effort_unsigned || !(view.step > 0.0)) {
+    return false;
+  }
+  bool any = false;
+  for (const JointView& joint : view.joints) {
+    const bool angle = joint.angle != nullptr;
+    const std::vector<double>& column = angle ? *joint.angle : *joint.speed;
+    std::size_t crossings = 0;
+    std::vector<std::size_t> rows = bounces(view, joint, column, angle);
+    std::string what =
+        fmt::format("bounces off zero {} times while its effort goes on as through a reversal", rows.size());
+    if (rows.empty()) {
+      rows = jumps_of_sign(view, joint, column, angle, crossings);
+      if (rows.size() < kLeastReversals || 5 * rows.size() < crossings) {
+        continue;
+      }
+      what =
+          fmt::format("jumps from one speed to its opposite {} times, as no effort of the log could do", rows.size());
+    }
+    LogFinding f{.id = "signals.no_direction",
+                 .topic = FindingTopic::signals,
+                 .severity = FindingSeverity::fatal,
+                 .sentence = fmt::format("{} {}: its sensor does not see the direction, and the sign is {}.",
+                                         joint.motion_name(), what, crossings > 0 ? "that of the command" : "missing"),
+                 .next =
+                     "Count both channels of the encoder, or log a sensor that sees the direction; else record a "
+                     "drive in which no wheel reverses (no turning on the spot), where no sign is needed.",
+                 .columns = {joint.motion_name()},
+                 .value = static_cast<double>(rows.size()),
+                 .unit = "1",
+                 .refuses = true};
+    std::vector<bool> flagged(view.log->rows(), false);
+    for (const std::size_t row : rows) {
+      flagged[row] = true;
+    }
+    set_stretches(f, view, flagged, view.step);
+    findings.push_back(std::move(f));
+    any = true;
+  }
+  return any;
+}
+
+}  // namespace wheelwright::doctor
