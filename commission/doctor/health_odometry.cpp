@@ -590,7 +590,7 @@ void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
       view.column("y") != nullptr) {
     if (const auto turned = turned_heading(view, findings)) {
       LogTable straight = *view.log;
-      std::vector<double>& theta = straight.columns[*core::position_of(straight, "theta")];
+      std::vector<double>& theta = straight.column("theta");
       std::ranges::for_each(theta, [&](double& heading) { heading += turned->offset; });
       check_wheels_and_pose(make_view(straight, view.robot_given ? std::optional(view.robot) : std::nullopt), findings);
       return;
