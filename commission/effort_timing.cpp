@@ -2,10 +2,13 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include <Eigen/QR>
 
 #include "commission/contradiction_search.hpp"
+#include "commission/effort_smoothing.hpp"
 #include "commission/evidence.hpp"
 #include "commission/fit.hpp"
 #include "commission/setting.hpp"
@@ -75,13 +78,8 @@ double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
   return limit > 0.0 ? from.more.dot(from.residual) / limit : 0.0;
 }
 
-}  // namespace
-
-std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, const Fit& fit, double longest,
-                                          std::size_t most_rows) {
-  if (s.measurement.effort_unsigned) {
-    return std::nullopt;
-  }
+// The rows as logged, without bounds on their errors; nothing where they are too few.
+std::optional<RegressionBlock> rows_as_logged(LogSource& log, const Setting& s, std::size_t most_rows) {
   Setting as_logged = s;  // a declared delay is compared with what is found, not taken away before
   as_logged.measurement.delay = {0.0, 0.0};
   TorqueRows stream = make_rows(log, as_logged, errors_of_fit(s));
@@ -89,13 +87,46 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
   log.rewind();
   rows.dY.setZero();
   rows.dy.setZero();
-  if (rows.instants() < kFewestInstants) {
+  return rows.instants() < kFewestInstants ? std::nullopt : std::optional(std::move(rows));
+}
+
+// The sum over instants of |a|² − |b|², as a multiple of what is certain at a risk of 0.1 %: residuals of the outputs
+// at the instants that both know.
+double preference_of(const Shifted& a, const std::vector<std::size_t>& of_a, const Shifted& b,
+                     const std::vector<std::size_t>& of_b, Eigen::Index outputs) {
+  constexpr double kConfidence = 0.999;
+  identify::BlockSums differences(1);
+  double sum = 0.0;
+  for (std::size_t i = 0, j = 0; i < of_a.size() && j < of_b.size();) {
+    if (of_a[i] != of_b[j]) {
+      of_a[i] < of_b[j] ? ++i : ++j;
+      continue;
+    }
+    const double more = a.residual.segment(static_cast<Eigen::Index>(i++) * outputs, outputs).squaredNorm() -
+                        b.residual.segment(static_cast<Eigen::Index>(j++) * outputs, outputs).squaredNorm();
+    differences.add(Eigen::VectorXd::Constant(1, more));
+    sum += more;
+  }
+  const identify::LongRunCovariance seen = identify::long_run_covariance(differences);
+  const double error = std::sqrt(seen.matrix(0, 0));
+  return error > 0.0 ? sum / (error * core::student_quantile(kConfidence, std::max<double>(seen.freedom, 1.0))) : 0.0;
+}
+
+}  // namespace
+
+std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, const Fit& fit, double longest,
+                                          std::size_t most_rows) {
+  if (s.measurement.effort_unsigned) {
+    return std::nullopt;
+  }
+  const std::optional<RegressionBlock> rows = rows_as_logged(log, s, most_rows);
+  if (!rows) {
     return std::nullopt;
   }
   const Interval declared = s.measurement.delay;
   const double reach = longest + core::magnitude(declared);  // its sign may be mistaken
   try {
-    const identify::TimeShiftedRows model(rows, identify::TimeEffect::delay, -reach, reach);
+    const identify::TimeShiftedRows model(*rows, identify::TimeEffect::delay, -reach, reach);
     identify::VariableProjectionOptions options = model.options();
     options.weights = fit.weights;
     options.flat = 1e-6;  // what is left of the way is for the last steps, on the gradient alone
@@ -141,6 +172,39 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     return timing;
   } catch (const InvalidArgument&) {
     return std::nullopt;  // segments shorter than the longest shift
+  }
+}
+
+std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s, const Fit& fit, double delay,
+                                                double longest, std::size_t most_rows) {
+  if (s.measurement.effort_unsigned) {
+    return std::nullopt;
+  }
+  const std::optional<RegressionBlock> rows = rows_as_logged(log, s, most_rows);
+  if (!rows) {
+    return std::nullopt;
+  }
+  try {
+    const identify::TimeShiftedRows filters(*rows, identify::TimeEffect::effort_lag, 0.0, longest);
+    const identify::TimeShiftedRows shifts(*rows, identify::TimeEffect::delay, -delay, std::max(longest, 2.0 * delay));
+    identify::VariableProjectionOptions options = filters.options();
+    options.weights = fit.weights;
+    const identify::SeparableFit found = identify::variable_projection(filters, options);
+    if (found.end != identify::SearchEnd::converged || found.state[0] != identify::ShapeState::identified) {
+      return std::nullopt;
+    }
+    const auto filtered = at_shift(filters, found.shape[0], fit.weights),
+               shifted = at_shift(shifts, delay, fit.weights);
+    if (!filtered || !shifted) {
+      return std::nullopt;
+    }
+    return EffortSmoothing{.time_constant = found.shape[0],
+                           .standard_error = found.standard_error[0],
+                           .freedom = found.freedom,
+                           .preference = preference_of(*shifted, shifts.instants(), *filtered, filters.instants(),
+                                                       static_cast<Eigen::Index>(s.model.n()))};
+  } catch (const InvalidArgument&) {
+    return std::nullopt;  // segments shorter than six of the longest filter
   }
 }
 

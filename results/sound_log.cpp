@@ -28,6 +28,9 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
   std::vector<std::string> names;
   for (const doctor::LogFinding& finding : health.findings) {
     if (!finding.is_refusal()) {
+      if (finding.id == "units.effort") {  // a wrong scale of the efforts is one of all that is found
+        out.remarks.push_back(fmt::format("{}: {} {}", finding.id, finding.sentence, finding.next));
+      }
       continue;
     }
     if (std::ranges::count(despite, finding.id) > 0) {

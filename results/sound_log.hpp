@@ -28,7 +28,7 @@ enum class WheelPose {
 struct SoundLog {
   std::unique_ptr<logs::RecordedLog> log;
   Robot robot;                       ///< as declared, with what the log itself shows of its sensors
-  std::vector<std::string> remarks;  ///< what was hidden and why, and what was passed over; one sentence each
+  std::vector<std::string> remarks;  ///< what was hidden and why, what was passed over, and an odd scale of the efforts
 };
 
 /// The log in `paths` with the columns that `robot` can use, after the doctor's checks of its first kExaminedRows: for

@@ -7,13 +7,16 @@
 #include <fmt/format.h>
 
 #include "commission/contradictions.hpp"
+#include "commission/doctor/health_efforts.hpp"
 #include "commission/doctor/log_health.hpp"
+#include "commission/effort_smoothing.hpp"
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
 #include "commission/setting.hpp"
 #include "commission/speed_smoothing.hpp"
 #include "core/error.hpp"
 #include "core/statistics.hpp"
+#include "core/words.hpp"
 #include "identify/inference/identifiability.hpp"
 
 namespace wheelwright::doctor {
@@ -23,8 +26,10 @@ constexpr double kSome = 0.02;              // share of the rows that makes a ma
 constexpr double kTractionSpan = 0.1;       // s to both sides, for an acceleration
 constexpr double kMostTraction = 25.0;      // m/s²: two and a half times that of gravity
 constexpr double kChangedPlaces = 0.15;     // sum of |log| of two ratios to nominal values
-constexpr double kMostTimesNominal = 20.0;  // a robot may carry a load
-constexpr double kLeastTimesNominal = 0.2;  // and loses less
+constexpr double kOddTimesNominal = 3.0;    // either way: worth a word
+constexpr double kMostTimesNominal = 8.0;   // robots that carry goods carry up to seven times their own mass
+constexpr double kLeastTimesNominal = 0.2;  // and lose less
+constexpr double kOneFactor = 1.25;         // between ratios of mass, inertia and friction that are one factor
 constexpr double kUnusedRisk = 1e-3;        // for fit_log; not used further
 constexpr double kLongestTaken = 0.03;      // s: efforts later than this are refused
 constexpr double kTakenFrom = 0.5;          // of the least shift that is a latency
@@ -188,8 +193,8 @@ struct TorqueUnit {
   double ratio;
   const char* unit;
 };
-constexpr TorqueUnit kTorqueUnits[] = {
-    {1000.0, "mN·m"}, {141.6, "ozf·in"}, {100.0, "N·cm"}, {10.197, "kgf·cm"}, {8.851, "lbf·in"}};
+constexpr TorqueUnit kTorqueUnits[] = {{1000.0, "mN·m"},   {141.6, "ozf·in"}, {100.0, "N·cm"},
+                                       {10.197, "kgf·cm"}, {8.851, "lbf·in"}, {0.10197, "kgf·m"}};
 
 // By how much masses come out too small where wheel speeds are in another unit.
 constexpr TorqueUnit kSpeedUnits[] = {{std::numbers::pi / 180.0, "deg/s"}, {std::numbers::pi / 30.0, "rpm"}};
@@ -279,44 +284,143 @@ void check_mirrored(const HealthView& view, const commission::Setting& s, const 
                  .unit = "1"});
 }
 
+// A quantity of a first fit beside the robot file's.
+struct NominalRatio {
+  std::string name;
+  double value = 0.0, nominal = 0.0;
+  bool is_mass = false, is_friction = false;
+  [[nodiscard]] double ratio() const { return value / nominal; }
+};
+
+std::vector<NominalRatio> nominal_ratios(const commission::Setting& s, const commission::Fit& fit) {
+  std::vector<NominalRatio> ratios;
+  const auto scales = commission::physical_scales(s.robot, s.model);
+  for (std::size_t j = 0; scales && j < s.model.p(); ++j) {
+    const model::Parameter& p = s.model.parameters[j];
+    const auto nominal = s.robot.nominal.find(p.physical);
+    if (nominal != s.robot.nominal.end() && nominal->second > 0.0 &&
+        fit.excitation[j].state == identify::Excitation::identified) {
+      const double value = (*scales)[j].scale * fit.estimate[static_cast<Eigen::Index>(j)] - (*scales)[j].offset;
+      ratios.push_back({p.physical, value, nominal->second, p.moved_mass, p.physical.starts_with("viscous")});
+    }
+  }
+  return ratios;
+}
+
+// Whether mass, inertia and friction are off by one and the same factor, as a load does not change them.
+bool by_one_factor(const std::vector<NominalRatio>& ratios, double factor) {
+  std::size_t frictions = 0;
+  for (const NominalRatio& r : ratios) {
+    if (!(r.ratio() > factor / kOneFactor && r.ratio() < factor * kOneFactor)) {
+      return false;
+    }
+    frictions += r.is_friction ? 1 : 0;
+  }
+  return frictions > 0 && ratios.size() >= 3;
+}
+
+// What efforts that are `ratio` times too large (at most `top`) may be in, and what one of them is then in the unit
+// that is expected, 0 where that is not known.
+struct EffortUnit {
+  std::string words;
+  double factor = 0.0;
+};
+
+EffortUnit unit_of_efforts(const Robot& robot, double ratio, double top) {
+  const auto near = [&](double known, double share) { return std::abs(ratio / known - 1.0) < share; };
+  const auto limit = robot.limits.find("effort");
+  const double declared = limit != robot.limits.end() ? limit->second : 0.0;
+  if (declared > 0.0 && top <= 101.0 && near(100.0 / declared, 0.3)) {
+    return {"in per cent of limits.effort", 0.01 * declared};
+  }
+  if (declared > 0.0 && near(1000.0 / declared, 0.3)) {
+    return {"in thousandths of limits.effort", 0.001 * declared};
+  }
+  if (robot.motor && robot.motor->gear_ratio > 1.0 && near(1.0 / robot.motor->gear_ratio, 0.3)) {
+    return {"those of the motor's shaft, before the gear", robot.motor->gear_ratio};
+  }
+  if (robot.effort != model::EffortKind::torque) {
+    return near(1000.0, 0.3) ? EffortUnit{robot.effort == model::EffortKind::current ? "in mA" : "in mV", 0.001}
+                             : EffortUnit{};
+  }
+  for (const TorqueUnit& known : kTorqueUnits) {
+    if (near(known.ratio, known.ratio < 50.0 ? 0.1 : 0.3)) {
+      return {fmt::format("in {}", known.unit), 1.0 / known.ratio};
+    }
+  }
+  if (ratio > 1.0 && top <= 101.0) {
+    return {fmt::format("in per cent of {:.2g} N·m", 100.0 / ratio), 0.0};
+  }
+  if (ratio > 1.0 && top <= 3000.0) {
+    return {fmt::format("in thousandths of {:.2g} N·m", 1000.0 / ratio), 0.0};
+  }
+  if (ratio < 1.0 && top <= 1.01) {
+    return {fmt::format("shares (0 to 1) of {:.2g} N·m", 1.0 / ratio), 0.0};
+  }
+  return ratio < 1.0 ? EffortUnit{fmt::format("those of a motor's shaft, before a gear of about {:.2g}", 1.0 / ratio)}
+                     : EffortUnit{};
+}
+
+std::string convert_efforts(const HealthView& view, double ratio, const EffortUnit& unit) {
+  const bool known = unit.factor > 0.0;
+  const double factor = known ? unit.factor : 1.0 / ratio;
+  std::vector<std::string> maps;
+  for (const JointView& j : view.joints) {
+    maps.push_back(fmt::format("--map {}=\"COLUMN*{:.4g}\"", j.effort_name, factor));
+  }
+  return fmt::format(
+      "Say what one unit of the efforts is{}: `{}` (or the same under `columns:` in the robot file), with COLUMN as "
+      "the "
+      "log calls it{}. Or correct effort.kind, wheel_radius or nominal in the robot file.",
+      view.robot.effort == model::EffortKind::torque ? " in N·m at the wheel" : "", core::listed(maps, " "),
+      known ? ""
+            : fmt::format("; {:.4g} is what makes the mass the nominal one: take the drive's data sheet (rated torque, "
+                          "gear, torque constant) for the true factor",
+                          factor));
+}
+
 void check_effort_scale(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
                         std::vector<LogFinding>& out) {
-  const auto scales = commission::physical_scales(s.robot, s.model);
-  for (std::size_t j = 0; view.robot_given && scales && j < s.model.p(); ++j) {
-    const std::string& name = s.model.parameters[j].physical;
-    const auto nominal = s.robot.nominal.find(name);
-    if (!s.model.parameters[j].moved_mass || nominal == s.robot.nominal.end() || !(nominal->second > 0.0) ||
-        fit.excitation[j].state != identify::Excitation::identified) {
+  if (!view.robot_given) {
+    return;
+  }
+  const std::vector<NominalRatio> ratios = nominal_ratios(s, fit);
+  for (const NominalRatio& mass : ratios) {
+    const double ratio = mass.ratio();
+    if (!mass.is_mass || !(ratio > 0.0) || (ratio < kOddTimesNominal && ratio > 1.0 / kOddTimesNominal)) {
       continue;
     }
-    const double value = (*scales)[j].scale * fit.estimate[static_cast<Eigen::Index>(j)] - (*scales)[j].offset;
-    const double ratio = value / nominal->second;
-    if (!(ratio > 0.0) || (ratio < 3.0 && ratio > 1.0 / 3.0)) {
-      continue;
-    }
-    std::string hint;
-    for (const TorqueUnit& known : kTorqueUnits) {
-      if (std::abs(ratio / known.ratio - 1.0) < (known.ratio < 50.0 ? 0.1 : 0.3)) {
-        hint = fmt::format(" as if efforts were in {}", known.unit);
+    const bool one_factor = by_one_factor(ratios, ratio);
+    double top = 0.0;
+    for (const JointView& j : view.joints) {
+      for (const double e : *j.effort) {
+        top = std::max(top, std::abs(e));
       }
     }
-    if (s.robot.motor && s.robot.motor->gear_ratio > 1.0 && std::abs(ratio * s.robot.motor->gear_ratio - 1.0) < 0.3) {
-      hint = " as if efforts were those of the motor's shaft, before the gear";
-    }
+    EffortUnit unit = unit_of_efforts(view.robot, ratio, top);
+    bool of_speeds = false;
     for (const TorqueUnit& known : kSpeedUnits) {
       if (std::abs(ratio / known.ratio - 1.0) < 0.3) {
-        hint = fmt::format(" as if the wheels' motion were in {}", known.unit);
+        of_speeds = true;
+        unit.words = fmt::format("the wheels' motion were in {}", known.unit);
       }
     }
-    const bool far = ratio > kMostTimesNominal || ratio < kLeastTimesNominal;
+    const bool far = one_factor || ratio > kMostTimesNominal || ratio < kLeastTimesNominal;
     out.push_back(
         {.id = "units.effort",
          .topic = FindingTopic::units,
          .severity = far ? FindingSeverity::fatal : FindingSeverity::warning,
          .sentence = fmt::format("Efforts and motion give a {} of {:.3g} where the robot file has {:.3g}: {:.3g} "
-                                 "times as much{}.",
-                                 name, value, nominal->second, ratio, hint),
-         .next = "Check the unit of the efforts (N·m at the wheel, A, V), effort.kind, and the wheel radius.",
+                                 "times as much{}{}.",
+                                 mass.name, mass.value, mass.nominal, ratio,
+                                 one_factor ? ", and the frictions likewise, which no load does" : "",
+                                 unit.words.empty() ? ""
+                                 : of_speeds        ? ", as if " + unit.words
+                                                    : ", as if efforts were " + unit.words),
+         .next = of_speeds
+                     ? "Convert the wheels' motion to rad and rad/s at the wheel, or check the unit of the efforts "
+                       "(N·m at the wheel, A, V), effort.kind, and the wheel radius."
+                     : convert_efforts(view, ratio, unit),
          .columns = s.measurement.effort_columns,
          .value = ratio,
          .unit = "1"});
@@ -409,11 +513,22 @@ bool check_excitation(const HealthView& view, LogSource& log, const commission::
   return true;
 }
 
+// Of efforts that come late.
+std::string smoothing_words(const commission::EffortSmoothing& filter) {
+  const std::string told = fmt::format("a first-order low-pass filter of {:.2g} ± {:.1g} s (95 %)",
+                                       filter.time_constant, 2.0 * filter.standard_error);
+  return filter.preference > 1.0    ? fmt::format(" They are smoothed: {} explains the log better than a shift.", told)
+         : filter.preference < -1.0 ? " They are late, not smoothed: a shift explains the log better than a filter."
+                                    : fmt::format(
+                                          " Smoothed efforts look like that, too: {}; the log does not tell "
+                                          "which.",
+                                          told);
+}
+
 // Effort against motion in time, where a shift explains the log better than none.
-void check_delay(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
+void check_delay(const HealthView& view, LogSource& log, const commission::Setting& s, const commission::Fit& fit,
                  std::vector<LogFinding>& out) {
-  TableSource source(*view.log);
-  const std::optional<commission::EffortTiming> timing = commission::effort_timing(source, s, fit);
+  const std::optional<commission::EffortTiming> timing = commission::effort_timing(log, s, fit);
   if (!timing) {
     return;
   }
@@ -457,8 +572,18 @@ void check_delay(const HealthView& view, const commission::Setting& s, const com
   const double half = delay / view.step;
   const bool held = matters && s.measurement.hold == Hold::first_order && std::abs(half + 0.5) < 0.2;
   const bool measured = matters && s.measurement.hold == Hold::zero_order && std::abs(half - 0.5) < 0.2;
-  f.next = held       ? "That is half a step: the efforts look like commands that are held. Set effort.hold to "
-                        "zero_order in the robot file."
+  const std::optional<commission::EffortSmoothing> filter = matters && timing->delay > timing->allowed.upper
+                                                                ? commission::effort_smoothing(log, s, fit, delay)
+                                                                : std::nullopt;
+  if (filter) {
+    f.sentence += smoothing_words(*filter);
+  }
+  const bool smoothed = filter && filter->preference > 1.0;
+  f.next = smoothed ? "Log efforts as they are before they are smoothed; or declare what the filter comes to for slow "
+                      "motion, `effort: {delay: [lo, hi]}` in the robot file, with a range that holds its time "
+                      "constant."
+           : held   ? "That is half a step: the efforts look like commands that are held. Set effort.hold to "
+                      "zero_order in the robot file."
            : measured ? "That is half a step: the efforts look measured. Set effort.hold to first_order in the "
                         "robot file."
            : large    ? "Stamp both with one clock where they are measured; where they are, the actuator or a "
@@ -501,8 +626,10 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
     return false;
   }
   check_effort_sense(view, findings);
+  check_copied_efforts(view, findings);
+  const std::optional<LogTable> sound = check_frozen_efforts(view, findings);
   try {
-    TableSource log(*view.log);
+    TableSource log(sound ? *sound : *view.log);
     Robot robot = view.robot;
     const commission::Setting s = commission::settle(log, robot);
     const commission::Fit fit = commission::fit_log(log, s, commission::Part::everything, kUnusedRisk);
@@ -512,7 +639,7 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
       check_sides(s, fit, findings);
       check_mirrored(view, s, fit, findings);
       check_remainder(s, fit, findings);
-      check_delay(view, s, fit, findings);
+      check_delay(view, log, s, fit, findings);
     }
     return excited;
   } catch (const Error& error) {

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "commission/doctor/health_efforts.hpp"
 #include "commission/doctor/log_health.hpp"
 #include "core/error.hpp"
 #include "identify/inference/noise_levels.hpp"
@@ -22,34 +23,7 @@ constexpr double kLongTime = 0.5;     // s, likewise
 constexpr std::size_t kPinned = 5;    // rows at an extreme value that make a limit
 constexpr double kFresh = 0.6;        // distinct values per change above which a column is finely resolved
 
-// Rows [first, last) that hold exactly one value.
-struct Run {
-  std::size_t first = 0, last = 0;
-  double value = 0.0;
-  [[nodiscard]] std::size_t rows() const { return last - first; }
-};
-
-std::vector<Run> runs_of(const HealthView& view, const std::vector<double>& column) {
-  std::vector<Run> runs;
-  for (const auto& [first, last] : view.segments) {
-    for (std::size_t k = first; k < last; ++k) {
-      if (k > first && column[k] == runs.back().value) {
-        runs.back().last = k + 1;
-      } else {
-        runs.push_back({k, k + 1, column[k]});
-      }
-    }
-  }
-  return runs;
-}
-
-bool moves(const HealthView& view, const Run& run) {
-  std::size_t moving = 0;
-  for (std::size_t k = run.first; k < run.last; ++k) {
-    moving += view.moving[k] ? 1U : 0U;
-  }
-  return 2 * moving >= run.rows();
-}
+using Run = ValueRun;
 
 double mean_rows(const std::vector<Run>& runs) {
   double rows = 0.0;
@@ -134,14 +108,14 @@ bool is_stuck(const HealthView& view, const Column& c, const Run& run, double us
   const std::vector<double>& t = view.log->t;
   const bool is_long = run.rows() >= kLongRun && t[run.last - 1] - t[run.first] >= kLongTime &&
                        static_cast<double>(run.rows()) > 5.0 * usual;
-  if (!is_long || !moves(view, run)) {
+  if (!is_long || !mostly_moves(view, run)) {
     return false;
   }
   switch (c.kind) {
     case ColumnKind::speed: return run.value != 0.0 || moves_by_itself(c, run).value_or(false);
     case ColumnKind::angle: return moves_by_itself(c, run).value_or(false);
-    case ColumnKind::effort: return run.value != 0.0 && view.robot.hold == Hold::first_order;
-    case ColumnKind::pose: return false;  // a straight drive along an axis holds a coordinate
+    case ColumnKind::effort: return false;  // what its motion says of it: check_frozen_efforts()
+    case ColumnKind::pose: return false;    // a straight drive along an axis holds a coordinate
   }
   return false;
 }
@@ -182,7 +156,7 @@ void check_stuck(const HealthView& view, const Column& c, const std::vector<Run>
 std::optional<double> repeats(const HealthView& view, const Column& c, const std::vector<Run>& all) {
   std::vector<Run> runs;
   for (const Run& run : all) {
-    if (moves(view, run) && run.rows() < kLongRun && (c.kind != ColumnKind::effort || run.value != 0.0)) {
+    if (mostly_moves(view, run) && run.rows() < kLongRun && (c.kind != ColumnKind::effort || run.value != 0.0)) {
       runs.push_back(run);
     }
   }
@@ -434,7 +408,7 @@ void check_signals(const HealthView& view, const ReaderCounts& reader, std::vect
   check_wrapped(view, reader, findings);
   std::map<ColumnKind, std::pair<std::vector<std::string>, double>> stale;
   for (const Column& c : columns) {
-    const std::vector<Run> runs = runs_of(view, *c.values);
+    const std::vector<Run> runs = value_runs(view, *c.values);
     check_stuck(view, c, runs, findings);
     if (const auto rows = repeats(view, c, runs)) {
       auto& [names, most] = stale[c.kind];
