@@ -402,6 +402,8 @@ LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const 
         [&] {
           check_signals(view, reader, health.findings);
           check_odometry(view, health.findings);
+          check_sources(view, health.findings);
+          check_drive(view, reader, health.findings);
         },
         [&] { reaches_bounds = check_motion(view, of_motion); });
     std::ranges::move(of_motion, std::back_inserter(health.findings));
