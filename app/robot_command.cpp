@@ -37,7 +37,8 @@ constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright robot --urdf my_robot.urdf --ros2-control controllers.yaml --out-file robot.yaml\n"
     "  wheelwright robot --urdf my_robot.urdf --left left_wheel_joint --right right_wheel_joint > robot.yaml\n"
-    "  wheelwright robot --urdf my_robot.urdf --wheel-radius 9.75cm --massless camera_link\n\n"
+    "  wheelwright robot --urdf my_robot.urdf --wheel-radius 9.75cm --massless camera_link\n"
+    "  wheelwright robot --urdf my_robot.urdf --massless all\n\n"
     "xacro has to be expanded first: xacro my_robot.urdf.xacro > my_robot.urdf.";
 
 robots::RobotWithOrigins made(const Arguments& a) {
@@ -111,7 +112,9 @@ Run add_robot(CLI::App& program) {
   command.add_option("--track-width", a->hints.track_width, "Distance of the wheels, before what the files say, m")
       ->transform(in_unit("m"))
       ->type_name("LENGTH");
-  command.add_option("--massless", a->hints.massless, "A link that has a shape and no mass (may be repeated)")
+  command
+      .add_option("--massless", a->hints.massless,
+                  "A link that has a shape and no mass (may be repeated); all: every such link")
       ->type_name("LINK")
       ->allow_extra_args(false);
   command.add_option("--name", a->hints.name, "Name of the robot")->type_name("NAME");

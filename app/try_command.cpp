@@ -355,6 +355,10 @@ int run(const Arguments& given) {
   std::string yaml;
   if (a.robot.empty()) {
     RobotWithOrigins made = geometry(a);
+    if (!made.columns.empty()) {
+      took.push_back(fmt::format("joints: {}", made.origins["columns"]));
+      a.common.columns.merge(std::exchange(made.columns, {}));
+    }
     settle_from_log(a, made);
     for (const logs::LogOptions reader = reader_options(a.common); const auto& [name, column] : reader.map) {
       a.common.columns[name] = column;
@@ -509,6 +513,11 @@ Run add_try(CLI::App& program) {
   command.add_option("--track-width", a->hints.track_width, "Distance of the wheels, m; goes before all files")
       ->transform(in_unit("m"))
       ->type_name("M");
+  command
+      .add_option("--massless", a->hints.massless,
+                  "A link of the description that has a shape and no mass (may be repeated); all: every such link")
+      ->type_name("LINK")
+      ->allow_extra_args(false);
   add_map(command, a->common);
   return finish(command, a, kExamples, run);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "results/health_json.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -30,12 +31,21 @@ Json finding_json(const doctor::LogFinding& finding) {
 }  // namespace
 
 doctor::ReaderCounts reader_counts(const logs::LogReport& report) {
+  std::vector<std::string> contradictions;
+  for (const logs::LogFileReport& file : report.files) {
+    for (const std::string& sentence : file.contradictions) {
+      if (std::ranges::find(contradictions, sentence) == contradictions.end()) {
+        contradictions.push_back(sentence);
+      }
+    }
+  }
   return {.rows_read = report.rows_read,
           .incomplete = report.empty.count + report.not_finite.count,
           .duplicates = report.duplicates.count,
           .truncated = report.truncated.count,
           .jumps = report.jumps.count,
-          .unwrapped = report.angle_wraps.count};
+          .unwrapped = report.angle_wraps.count,
+          .contradictions = std::move(contradictions)};
 }
 
 doctor::LogHealth examine_first(logs::RecordedLog& log, const std::optional<Robot>& robot, std::size_t most,

@@ -463,7 +463,7 @@ void check_pose_origin(const HealthView& view, std::vector<LogFinding>& out) {
   out.back().unit = origin.heading_repeats ? "rad" : "m";
 }
 
-void check_wheels_and_pose(const HealthView& view, std::vector<LogFinding>& findings) {
+void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
   check_angles(view, findings);
   const bool theta = view.column("theta") != nullptr, gyro = view.column("gyro_z") != nullptr;
   if (view.joints.size() != 2 || !view.has_motion() || (!theta && !gyro)) {
@@ -556,11 +556,18 @@ void check_wheels_and_pose(const HealthView& view, std::vector<LogFinding>& find
   }
 }
 
+namespace {
+
 constexpr double kTurnedHeading = 0.03;  // rad, from which on an offset is said and taken off
 constexpr double kOffsetErrors = 5.0;    // standard errors
 
-// The heading of a body that is not turned as the robot drives; nothing where there is none, or it cannot be told.
-std::optional<DrivingDirection> turned_heading(const HealthView& view, std::vector<LogFinding>& out) {
+}  // namespace
+
+std::optional<double> check_heading(const HealthView& view, std::vector<LogFinding>& out) {
+  if (view.joints.size() != 2 || !view.has_motion() || view.column("theta") == nullptr || view.column("x") == nullptr ||
+      view.column("y") == nullptr) {
+    return std::nullopt;
+  }
   const std::vector<Window> windows = windows_of(view);
   const double scale = heading_scale(windows);
   const auto found = driving_direction(windows, scale);
@@ -580,23 +587,7 @@ std::optional<DrivingDirection> turned_heading(const HealthView& view, std::vect
   const double margin = kOffsetErrors * found->error;
   f.taken = Interval{found->offset - margin, found->offset + margin};
   out.push_back(f);
-  return found;
-}
-
-}  // namespace
-
-void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
-  if (view.joints.size() == 2 && view.has_motion() && view.column("theta") != nullptr && view.column("x") != nullptr &&
-      view.column("y") != nullptr) {
-    if (const auto turned = turned_heading(view, findings)) {
-      LogTable straight = *view.log;
-      std::vector<double>& theta = straight.column("theta");
-      std::ranges::for_each(theta, [&](double& heading) { heading += turned->offset; });
-      check_wheels_and_pose(make_view(straight, view.robot_given ? std::optional(view.robot) : std::nullopt), findings);
-      return;
-    }
-  }
-  check_wheels_and_pose(view, findings);
+  return found->offset;
 }
 
 }  // namespace wheelwright::doctor

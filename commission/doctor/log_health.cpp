@@ -459,7 +459,12 @@ LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, co
   health.clock = check_clock(as_stamped, health.findings);
   const std::optional<LogTable> even =
       health.clock ? std::optional(core::read_evenly(stamped, *health.clock)) : std::nullopt;
-  const LogTable& log = even ? *even : stamped;
+  std::optional<LogTable> straight;
+  if (const auto offset = check_heading(make_view(even ? *even : stamped, robot), health.findings)) {
+    straight = even ? *even : stamped;
+    std::ranges::for_each(straight->column("theta"), [&](double& heading) { heading += *offset; });
+  }
+  const LogTable& log = straight ? *straight : even ? *even : stamped;
   const HealthView view = make_view(log, robot);
   health.rows = log.rows();
   health.segments = view.segments.size();
@@ -480,6 +485,8 @@ LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, co
           check_rounding(view, health.findings);
           check_odometry(view, health.findings);
           check_gyro_delay(view, health.findings);
+          check_sources(view, health.findings);
+          check_drive(view, reader, health.findings);
         },
         [&] { reaches_bounds = !check_direction(view, of_motion) && check_motion(view, of_motion); });
     std::ranges::move(of_motion, std::back_inserter(health.findings));

@@ -79,12 +79,13 @@ enum class LogVerdict {
 
 /// Defects that the reader of a log found and repaired. All zero where a log needed no reading.
 struct ReaderCounts {
-  std::size_t rows_read = 0;   ///< rows met, those dropped included; 0: not known
-  std::size_t incomplete = 0;  ///< rows dropped: a field that is needed is empty or not finite
-  std::size_t duplicates = 0;  ///< rows dropped: the time of the row before
-  std::size_t truncated = 0;   ///< last lines cut off
-  std::size_t jumps = 0;       ///< segments that begin where a wheel angle jumps as no wheel turns
-  std::size_t unwrapped = 0;   ///< jumps of a wheel angle by a turn that were undone
+  std::size_t rows_read = 0;                     ///< rows met, those dropped included; 0: not known
+  std::size_t incomplete = 0;                    ///< rows dropped: a field that is needed is empty or not finite
+  std::size_t duplicates = 0;                    ///< rows dropped: the time of the row before
+  std::size_t truncated = 0;                     ///< last lines cut off
+  std::size_t jumps = 0;                         ///< segments that begin where a wheel angle jumps as no wheel turns
+  std::size_t unwrapped = 0;                     ///< jumps of a wheel angle by a turn that were undone
+  std::vector<std::string> contradictions = {};  ///< why the joints are those of no differential drive, in sentences
 };
 
 /// The examination.
@@ -182,6 +183,13 @@ void check_rounding(const HealthView& view, std::vector<LogFinding>& findings);
 /// whether that, or that it cannot be told from a delay, was said.
 bool check_smoothing(const HealthView& view, const commission::Setting& setting, const commission::Fit& fit,
                      std::vector<LogFinding>& findings);
+/// Rows of a second source among those of a first.
+void check_sources(const HealthView& view, std::vector<LogFinding>& findings);
+/// Whether the log is that of a differential drive: joints as the reader met them, turning by gyro or pose against the
+/// wheels' difference and the efforts', displacement against the heading.
+void check_drive(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings);
+/// Angle from the heading to the direction in which the wheels drive, rad, where these differ: commands add it.
+std::optional<double> check_heading(const HealthView& view, std::vector<LogFinding>& findings);
 /// Wheel angles against speeds, wheels against pose and gyro: scales, signs, sides.
 void check_odometry(const HealthView& view, std::vector<LogFinding>& findings);
 

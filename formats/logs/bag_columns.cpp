@@ -15,6 +15,7 @@
 
 #include "core/error.hpp"
 #include "formats/files/words.hpp"
+#include "formats/logs/joint_choice.hpp"
 #include "formats/logs/recorded_log.hpp"
 #include "formats/logs/ros_messages.hpp"
 
@@ -137,12 +138,18 @@ class Chooser {
     leave_other_axes();
     leave_other_joints();
     take_offers();
+    for (BagSource& source : choice_.sources) {
+      joints_of_topic(source.topic).settle(source);
+    }
+    std::erase_if(choice_.sources, [](const BagSource& source) { return source.columns.empty(); });
     order_sources();
     return std::move(choice_);
   }
 
  private:
   [[nodiscard]] const BagTopic& topic(std::size_t k) const { return *topics_[k].topic; }
+
+  [[nodiscard]] JointChoice joints_of_topic(std::size_t k) { return {topics_[k], options_, path_, choice_}; }
 
   void list_fields(std::size_t k) {
     if (!topic(k).definition || choice_.header.size() >= most_listed) {
@@ -170,6 +177,10 @@ class Chooser {
 
   void take_mapped(const std::string& name, const std::string& mapped) {
     const auto [field, factor] = split_factor(mapped);
+    if (const auto place = joint_place(field)) {
+      take_joints(name, place->first, place->second, factor);
+      return;
+    }
     if (factor != 1.0) {
       choice_.notes.push_back(fmt::format("{} is {} times {:g}", name, field, factor));
     }
@@ -206,6 +217,52 @@ class Chooser {
     }
   }
 
+  /// Takes `name` of the topic that has these joints; says so where none has.
+  void take_joints(const std::string& name, const std::string& array, const std::vector<std::string>& joints,
+                   double factor) {
+    bool known = false;
+    std::vector<std::string> met;
+    for (std::size_t k = 0; k < topics_.size(); ++k) {
+      const BagTopicView& view = topics_[k];
+      if (topic(k).type != "sensor_msgs/msg/JointState" || !topic(k).definition ||
+          is_wished(plain_name(topic(k).name))) {
+        continue;
+      }
+      met.insert(met.end(), view.names.begin(), view.names.end());
+      if (!std::ranges::all_of(joints, [&](const auto& joint) { return std::ranges::count(view.names, joint) > 0; })) {
+        continue;
+      }
+      known = true;
+      std::vector<std::string> fields;
+      for (const std::string& joint : joints) {
+        fields.push_back(fmt::format("{}[{}]", array, joint));
+      }
+      const bool filled = std::ranges::all_of(fields, [&](const std::string& field) {
+        return view.elements.empty() ? std::ranges::count(view.filled, array) > 0
+                                     : std::ranges::count(view.elements, field) > 0;
+      });
+      if (filled) {
+        take(k, {name, std::move(fields), rule_of(array, joints), factor});
+        named_.push_back(name);
+        return;
+      }
+    }
+    if (known) {
+      named_.push_back(name);  // no other joint stands for it
+    } else if (!std::ranges::count(unknown_, joints)) {
+      unknown_.push_back(joints);
+      choice_.notes.push_back(fmt::format(
+          "no JointState names {}, which the robot file's columns say: {}; joints are chosen by their names",
+          core::listed(joints), met.empty() ? "there is none" : "they name " + core::listed(met)));
+    }
+  }
+
+  static BagColumn::Rule rule_of(std::string_view array, const std::vector<std::string>& joints) {
+    return joints.size() == 1  ? BagColumn::Rule::value
+           : array == "effort" ? BagColumn::Rule::sum
+                               : BagColumn::Rule::mean;
+  }
+
   /// Throws where the path's element is named and the topic's first message does not name it.
   void check_element(std::size_t k, const std::string& name, const std::string& path) const {
     const std::size_t open = path.find('['), close = path.find(']');
@@ -224,6 +281,9 @@ class Chooser {
 
   void offer(std::size_t k, std::string name, std::vector<std::string> fields, int rank,
              BagColumn::Rule rule = BagColumn::Rule::value) {
+    if (std::ranges::find(named_, name) != named_.end()) {
+      return;
+    }
     if (!options_.only || std::ranges::find(*options_.only, name) != options_.only->end()) {
       offers_.push_back({k, {std::move(name), std::move(fields), rule}, rank});
     }
@@ -360,15 +420,15 @@ class Chooser {
                                               core::listed(empty), column));
           continue;
         }
-        const BagColumn::Rule rule = joints.size() == 1 ? BagColumn::Rule::value
-                                     : column == effort ? BagColumn::Rule::sum
-                                                        : BagColumn::Rule::mean;
-        offer(k, column, std::move(fields), 1, rule);
+        offer(k, column, std::move(fields), 1, rule_of(array, joints));
       }
     };
     const auto give_side = [&](const std::vector<std::string>& joints, const std::string& side) {
       give(joints, "phi_" + side, "omega_" + side, "tau_" + side);
     };
+    JointChoice judged = joints_of_topic(k);
+    judged.tell_unnamed();
+    judged.tell_steering();
     if (view.names.size() == 1) {
       give(view.names, "position", "velocity", "effort");
       std::string side = side_of_joint(view.names.front());
@@ -381,10 +441,10 @@ class Chooser {
     std::vector<std::string> wheels;
     std::ranges::copy_if(view.names, std::back_inserter(wheels), [](const std::string& name) {
       const std::string plain = plain_name(name);
-      return contains(plain, "wheel") && !contains(plain, "caster") && !contains(plain, "steer");
+      return contains(plain, "wheel") && !is_caster(plain) && !is_steering(plain);
     });
     const std::vector<std::string>& joints = wheels.empty() ? view.names : wheels;
-    const std::vector<std::string> right = joints_of("r", joints), left = joints_of("l", joints);
+    std::vector<std::string> right = joints_of("r", joints), left = joints_of("l", joints);
     if (const auto none = joints_of("", wheels); !none.empty() && right.size() != left.size()) {
       choice_.notes.push_back(fmt::format(
           "{} has wheels of no side by their names ({}), and {} on the right but {} on the left: none was taken; --map "
@@ -392,14 +452,20 @@ class Chooser {
           view.topic->name, core::listed(none), right.size(), left.size(), view.topic->name));
       return;
     }
+    if (!is_named("r") || !is_named("l")) {
+      judged.sort_out(!wheels.empty(), right, left);
+    }
     const std::size_t before = offers_.size();
     for (const auto& [side, of_side] :
          {std::pair<std::string, const std::vector<std::string>&>("r", right), {"l", left}}) {
       if (of_side.size() == 1 || (of_side.size() > 1 && !wheels.empty())) {
         give_side(of_side, side);
       }
-      if (of_side.size() > 1) {
+      if (of_side.size() > 1 && !is_named(side)) {
         tell_side(*view.topic, side, of_side, !wheels.empty());
+        if (!wheels.empty()) {
+          judged.tell_apart(side, of_side);
+        }
       }
     }
     const bool driven = !wheels.empty() || std::ranges::all_of(view.names, [](const std::string& name) {
@@ -409,6 +475,15 @@ class Chooser {
     for (std::size_t at = before; at < offers_.size(); ++at) {
       offers_[at].other_joints = !driven;
     }
+  }
+
+  /// Whether all that is read of a side's wheel is named by the map.
+  [[nodiscard]] bool is_named(const std::string& side) const {
+    return std::ranges::all_of(std::array{"omega_" + side, "tau_" + side}, [&](const std::string& name) {
+      const auto mapped = options_.map.find(name);
+      return mapped != options_.map.end() &&
+             (!joint_place(split_factor(mapped->second).first) || std::ranges::find(named_, name) != named_.end());
+    });
   }
 
   static std::vector<std::string> joints_of(const std::string& side, const std::vector<std::string>& joints) {
@@ -550,6 +625,8 @@ class Chooser {
   BagChoice choice_;
   std::vector<Offer> offers_;
   std::vector<std::string> taken_;
+  std::vector<std::string> named_;                 ///< columns whose joints the map names, taken or not
+  std::vector<std::vector<std::string>> unknown_;  ///< joints that it names and no topic has
   std::vector<std::size_t> passed_over_;
   std::map<const RosDefinition*, Recognised> recognised_;
 };

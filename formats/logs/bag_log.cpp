@@ -15,6 +15,7 @@
 #include "core/error.hpp"
 #include "formats/files/words.hpp"
 #include "formats/logs/bag.hpp"
+#include "formats/logs/joint_states.hpp"
 #include "formats/logs/recorded_log.hpp"
 #include "formats/logs/ros_messages.hpp"
 #include "formats/logs/row_log.hpp"
@@ -24,6 +25,7 @@ namespace {
 
 constexpr std::int64_t one_second = 1'000'000'000;
 constexpr std::int64_t wall_clock = 100'000'000 * one_second;
+constexpr std::int64_t day = 86'400 * one_second;
 constexpr std::size_t first_messages = 2000;
 constexpr std::size_t looked_at = 20000;  ///< messages at least, for topics that a recording without index has
 
@@ -34,7 +36,6 @@ constexpr std::size_t between_runs = 200;  ///< messages: a topic that is late m
 constexpr std::size_t then_every = 100;  ///< of the later messages of a topic that names its elements
 
 constexpr std::string_view joint_state = "sensor_msgs/msg/JointState";
-constexpr std::array<const char*, 3> joint_arrays = {"position", "velocity", "effort"};
 
 /// Everything about a bag that one looks at before its rows are read.
 struct BagPlan {
@@ -120,6 +121,8 @@ std::vector<BagTopicView> view_topics(BagReader& bag) {
   std::map<std::size_t, BagTopicView> met;
   std::map<std::size_t, RosExtractor> unread;
   std::map<std::size_t, std::size_t> counts;
+  std::map<std::size_t, bool> surveyed;
+  JointMessage joints;
   BagMessage message;
   std::size_t read = 0;
   while ((read < looked_at || met.size() < bag.topics().size()) && bag.next(message)) {
@@ -134,16 +137,26 @@ std::vector<BagTopicView> view_topics(BagReader& bag) {
     }
     if (topic.type == joint_state && topic.definition && (count < each || count % then_every == 0)) {
       look_at(topic, message.data, view);
-    } else if (topic.definition && count == 0) {
+    } else if (topic.definition && count == 0 && topic.type != joint_state) {
       topic.type == "sensor_msgs/msg/Imu" ? look_at_imu(topic, message.data, view)
                                           : look_at_pose(topic, message.data, view);
+    }
+    if (topic.type == joint_state && topic.definition) {
+      const auto known = surveyed.find(message.topic);
+      const bool plain = known != surveyed.end() ? known->second : is_joint_state(*topic.definition);
+      surveyed[message.topic] = plain;
+      if (plain && read_joint_message(message.data, joints)) {
+        const std::int64_t time = joints.stamp != 0 ? joints.stamp : message.log_time;
+        view.joints.add(joints, static_cast<double>(time - message.log_time / day * day) / 1e9);
+      }
     }
   }
   std::vector<BagTopicView> views;
   for (std::size_t k = 0; k < bag.topics().size(); ++k) {
     const auto view = met.find(k);
-    views.push_back(view != met.end() ? view->second : BagTopicView{});
-    views.back().silent = view == met.end();
+    const bool silent = view == met.end();
+    views.push_back(silent ? BagTopicView{} : std::move(view->second));
+    views.back().silent = silent;
     views.back().topic = &bag.topics()[k];
   }
   return views;
@@ -214,6 +227,11 @@ struct Reading {
   std::size_t run_from = 0;     ///< the first of these, as counted
   std::size_t last_behind = 0;  ///< the last one that was late, as counted; 0 before the first
   std::string first_damage;
+  /// Whether messages are looked at as joint states, and what of: exclusions, and arrays whose elements go by names.
+  bool of_joints = false;
+  std::vector<JointExclusion> excluded;
+  std::vector<std::size_t> excluded_counts;
+  std::array<bool, 3> by_name{};
   std::vector<std::string> filled;     ///< arrays that were known to have numbers when columns were chosen
   std::vector<std::string> late_fill;  ///< in words, those that had some later
 };
@@ -277,6 +295,7 @@ class BagWalk final : public RowWalk {
     }
     file.notes.insert(file.notes.end(), plan_.choice.notes.begin(), plan_.choice.notes.end());
     file.notes.insert(file.notes.end(), plan_.clocks.notes.begin(), plan_.clocks.notes.end());
+    file.contradictions = plan_.choice.contradictions;
     for (std::size_t k = 0; k < readings_.size(); ++k) {
       describe(readings_[k], k, file);
     }
@@ -329,6 +348,16 @@ class BagWalk final : public RowWalk {
     stream.time_error = reading.clock.jitter;
     reading.extractor.emplace(plan_.definitions[k], fields);
     reading.longest_gap = static_cast<double>(stream.longest_gap) / static_cast<double>(one_second);
+    reading.of_joints = is_joint_state(plan_.definitions[k]);
+    reading.excluded = source.without;
+    reading.excluded_counts.assign(source.without.size(), 0);
+    for (const std::string& field : fields) {
+      for (std::size_t a = 0; a < joint_arrays.size(); ++a) {
+        const std::size_t name = std::string_view(joint_arrays[a]).size() + 1;
+        reading.by_name[a] = reading.by_name[a] || (field.starts_with(joint_arrays[a]) && field.size() > name &&
+                                                    field.find_first_not_of("0123456789", name) != field.size() - 1);
+      }
+    }
     reading.numbers.resize(fields.size());
     reading.values.resize(reading.columns.size());
     readings_.push_back(std::move(reading));
@@ -355,6 +384,9 @@ class BagWalk final : public RowWalk {
     if (report_ != nullptr && reading.messages % then_every == 0) {
       look_again(reading, message);
     }
+    if (reading.of_joints && is_left_out(reading, message)) {
+      return;
+    }
     if (!reading.extractor->read(message.data, reading.numbers)) {
       damage(reading, reading.extractor->error());
       return;
@@ -379,6 +411,27 @@ class BagWalk final : public RowWalk {
       return;
     }
     put_in_order(static_cast<std::size_t>(found - readings_.begin()), time + reading.clock.shift);
+  }
+
+  /// Whether a joint state is excluded, or has an array whose elements are not those of its names.
+  bool is_left_out(Reading& reading, const BagMessage& message) {
+    if (!read_joint_message(message.data, joints_)) {
+      return false;  // the extractor says why
+    }
+    const auto of = std::ranges::find_if(reading.excluded, [&](const auto& rule) { return rule.holds(joints_); });
+    if (of != reading.excluded.end()) {
+      ++reading.excluded_counts[static_cast<std::size_t>(of - reading.excluded.begin())];
+      return true;
+    }
+    for (std::size_t a = 0; a < joint_arrays.size(); ++a) {
+      const std::size_t length = joints_.numbers[a].size();
+      if (reading.by_name[a] && length != 0 && length != joints_.names.size()) {
+        damage(reading, fmt::format("{} has {} number{} for {} names", joint_arrays[a], length, length == 1 ? "" : "s",
+                                    joints_.names.size()));
+        return true;
+      }
+    }
+    return false;
   }
 
   /// Whether an array has numbers now that had none when columns were chosen.
@@ -524,6 +577,14 @@ class BagWalk final : public RowWalk {
       file.notes.push_back(fmt::format("{} of {} messages of {} could not be read and were left out (first: {})",
                                        reading.damaged, reading.messages, topic, reading.first_damage));
     }
+    for (std::size_t k = 0; k < reading.excluded.size(); ++k) {
+      const JointExclusion& rule = reading.excluded[k];
+      file.notes.push_back(
+          fmt::format("{} of {} messages of {} were left out: {} (frame '{}', names {})", reading.excluded_counts[k],
+                      reading.messages, topic,
+                      rule.numbers ? "of one constant content, and of a second publisher" : "of a second publisher",
+                      rule.frame, core::listed(rule.names)));
+    }
     file.notes.insert(file.notes.end(), reading.late_fill.begin(), reading.late_fill.end());
     if (reading.unstamped > 0) {
       file.notes.push_back(
@@ -561,6 +622,7 @@ class BagWalk final : public RowWalk {
   std::vector<double> row_;  ///< time, then the columns
   std::int64_t origin_;
   std::unique_ptr<BagReader> bag_;
+  JointMessage joints_;  ///< the last one that was looked at
   std::vector<Reading> readings_;
   std::optional<StreamAligner> aligner_;
   std::size_t number_ = 0;

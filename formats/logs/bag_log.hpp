@@ -16,6 +16,7 @@
 
 #include "formats/logs/bag.hpp"
 #include "formats/logs/csv_format.hpp"
+#include "formats/logs/joint_states.hpp"
 #include "formats/logs/log_file.hpp"
 #include "formats/logs/row_log.hpp"
 
@@ -75,13 +76,15 @@ struct BagColumn {
 struct BagSource {
   std::size_t topic = 0;  ///< index in BagReader::topics()
   std::vector<BagColumn> columns;
+  std::vector<JointExclusion> without = {};  ///< messages of the topic that are left out
 };
 
 /// The columns of a bag.
 struct BagChoice {
-  std::vector<BagSource> sources;   ///< the first gives the rows their times; empty where nothing is known
-  std::vector<std::string> header;  ///< all numeric fields there are, "topic.path"
-  std::vector<std::string> notes;   ///< what was taken or left although one might have thought otherwise
+  std::vector<BagSource> sources;                ///< the first gives the rows their times; empty where nothing is known
+  std::vector<std::string> header;               ///< all numeric fields there are, "topic.path"
+  std::vector<std::string> notes;                ///< what was taken or left although one might have thought otherwise
+  std::vector<std::string> contradictions = {};  ///< LogFileReport::contradictions
 };
 
 /// A topic and, of a type that names its elements (JointState), the names in its first messages.
@@ -96,13 +99,18 @@ struct BagTopicView {
   /// a pose.
   std::vector<std::string> unmeasured = {};
   std::string unreadable = {};  ///< why none of the first messages could be read; empty where one could
+  JointSurvey joints = {};      ///< of a JointState, what its first messages say of its joints
 };
 
 /// Chooses columns. What `options.map` says goes first: NAME=TOPIC.PATH, e.g.
 /// omega_r=/joint_states.velocity[right_wheel], the PATH as RosExtractor takes it, or ending in `.yaw` behind a
 /// quaternion; *FACTOR behind it multiplies it. Else:
 /// - sensor_msgs/JointState: the joints that are named right and left (of those named wheel, where there are any; no
-///   casters) give phi, omega and tau; of several wheels a side the mean of the motion and the sum of the efforts; a
+///   casters) give phi, omega and tau; of several wheels a side the mean of the motion and the sum of the efforts,
+///   without those that stand still while others turn, have no effort beside others that have one, or repeat another to
+///   the last digit; wheels of a side that do not turn as one, and steering joints that move, are contradictions; an
+///   angle or speed that stands still beside the other is left out; of two publishers of the same wheels the one whose
+///   wheels move, or alone have efforts; a
 ///   topic with one joint gives position, velocity and effort, too, and its own name may tell the side; where others
 ///   give columns of right and left wheels, and none is asked for by name, those of an axis are left out and reported,
 ///   as are joints named neither wheel, motor nor drive; a side of more wheels than the other is left out where a wheel
@@ -114,7 +122,10 @@ struct BagTopicView {
 /// - types of other packages than ROS's own give the columns that fields of theirs are named after;
 /// - a topic whose first messages cannot be read is left out and reported.
 /// Where two topics could give a column it is left out and reported. The rows' times are those of the topic with the
-/// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields.
+/// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields; for efforts
+/// whose array is not as long as the names, joints that are named twice, and publishers that cannot be told apart, unless
+/// the map says which elements are meant. An entry NAME=velocity[JOINT] or NAME=effort[JOINT,JOINT] names no topic: it is
+/// that of the JointState that has these joints, and is passed over, and said, where none has them.
 [[nodiscard]] BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,
                                            const std::string& path);
 

@@ -22,6 +22,7 @@
 #include "formats/files/bytes.hpp"
 #include "formats/files/words.hpp"
 #include "formats/logs/csv.hpp"
+#include "formats/logs/joint_states.hpp"
 #include "formats/logs/known_logger.hpp"
 #include "formats/logs/log_file.hpp"
 #include "formats/logs/recorded_log.hpp"
@@ -320,6 +321,9 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
   check_has_names(header.fields, place);
   for (const auto& [name, column] : options.map) {
     const auto [field, factor] = find_field(header.fields, column) ? std::pair{column, 1.0} : split_factor(column);
+    if (joint_place(field) && !find_field(header.fields, field)) {
+      continue;  // joints of a JointState: a table has the columns under their own names
+    }
     header.found[name] = demand_field(header.fields, field, "which --map " + name + "=" + column + " names", place);
     if (factor != 1.0) {
       header.factors[name] = factor;

@@ -23,7 +23,8 @@ namespace wheelwright::logs {
 struct CsvOptions {
   /// Contract name (or a name in `extra`) -> column of the file (of a bag TOPIC.PATH, of an HDF5 file a dataset), for
   /// headers that no spelling covers (`--map name=column`). It goes before everything else. COLUMN*FACTOR multiplies
-  /// what stands in COLUMN, for logs in other units, where no column is called so.
+  /// what stands in COLUMN, for logs in other units, where no column is called so. Of a bag also velocity[JOINT] or
+  /// effort[JOINT,JOINT] without a topic: what has no such joints is read as if there were no such entry.
   std::map<std::string, std::string> map;
   /// Further columns to read under their own names; a file that lacks one is an error.
   std::vector<std::string> extra;

@@ -18,6 +18,7 @@
 #include "formats/logs/bag_log.hpp"
 #include "formats/logs/csv.hpp"
 #include "formats/logs/hdf5_log.hpp"
+#include "formats/logs/joint_states.hpp"
 
 namespace wheelwright::logs {
 
@@ -68,6 +69,9 @@ std::unique_ptr<RecordedLog> read_evenly(std::unique_ptr<RecordedLog> log, const
 std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& paths, const LogOptions& options) {
   check::that(!paths.empty(), "paths", "at least one file");
   const auto origin = std::make_shared<std::optional<std::int64_t>>();
+  LogOptions of_tables = options;  // which name no joints
+  std::erase_if(of_tables.map,
+                [](const auto& entry) { return joint_place(split_factor(entry.second).first).has_value(); });
   std::vector<std::unique_ptr<RowFile>> files;
   std::vector<std::string> states;
   for (const std::filesystem::path& path : paths) {
@@ -86,7 +90,7 @@ std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& 
                        ": is a directory: expected a file, or a directory with a recording "
                        "(metadata.yaml, *.mcap or *.db3)");
     } else {
-      files.push_back(is_hdf5(path) ? hdf5_file(path, options) : csv_file(path, options));
+      files.push_back(is_hdf5(path) ? hdf5_file(path, of_tables) : csv_file(path, options));
     }
   }
   auto log = std::make_unique<RowLog>(std::move(files), RowLogOptions{.block_rows = options.block_rows,

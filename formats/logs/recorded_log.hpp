@@ -76,6 +76,8 @@ struct LogFileReport {
   double time_origin = 0.0;          ///< s, of the file's own clock: what its times are counted from
   std::vector<Interpolation> interpolated;
   std::vector<std::string> notes;  ///< what else was decided or lost, one sentence each
+  /// Why the recording is of no differential drive, one sentence each; empty where nothing says so.
+  std::vector<std::string> contradictions = {};
 };
 
 /// A whole log.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -58,6 +59,7 @@ struct Maker {
     const WheelJoints* const joints = wheels ? &*wheels : nullptr;
     add_effort(out, tree, joints);
     add_limits(out, joints, {controller, plugin});
+    columns();
     what_files_do_not_have();
     for (const DriveFacts* facts : {controller, plugin}) {
       if (facts != nullptr) {
@@ -267,6 +269,34 @@ struct Maker {
     }
   }
 
+  // Joints of a JointState, so that casters and arms beside them are not asked.
+  void columns() {
+    std::vector<std::string> right, left;
+    if (wheels) {
+      right = {wheels->right.name};
+      left = {wheels->left.name};
+      for (const TreeJoint& other : wheels->others) {
+        (2.0 * other.origin.y() < wheels->right.origin.y() + wheels->left.origin.y() ? right : left)
+            .push_back(other.name);
+      }
+      out.origins["columns"] = wheels->reason + "; these joints of a JointState are read, and no others";
+    } else {
+      right = controller->right;
+      left = controller->left;
+      out.origins["columns"] = controller->place.text() + "; these joints of a JointState are read, and no others";
+    }
+    const char* const effort = out.robot.effort == model::EffortKind::current   ? "current_"
+                               : out.robot.effort == model::EffortKind::voltage ? "voltage_"
+                                                                                : "tau_";
+    for (const auto& [side, joints] : {std::pair("r", &right), {"l", &left}}) {
+      if (!joints->empty()) {
+        out.columns["phi_" + std::string(side)] = fmt::format("position[{}]", fmt::join(*joints, ","));
+        out.columns["omega_" + std::string(side)] = fmt::format("velocity[{}]", fmt::join(*joints, ","));
+        out.columns[std::string(effort) + side] = fmt::format("effort[{}]", fmt::join(*joints, ","));
+      }
+    }
+  }
+
   void what_files_do_not_have() {
     out.origins["noise"] = "estimate, because no such file holds it; a bound that is known goes here";
     out.origins["filter"] = "default, because the log decides";
@@ -349,6 +379,9 @@ std::string robot_yaml(const RobotWithOrigins& robot) {
       out += comment(origin(member.key()), "") + member.key() + ": " + files::json_text(member.value(), -1) + "\n";
     }
   }
+  if (!robot.columns.empty()) {
+    out += comment(origin("columns"), "") + columns_yaml(robot.columns);
+  }
   for (const std::string& remark : robot.remarks) {
     out += comment(remark, "");
   }
@@ -356,8 +389,16 @@ std::string robot_yaml(const RobotWithOrigins& robot) {
 }
 
 Json to_json(const RobotWithOrigins& robot, const std::string& software) {
-  return {{"schema", "wheelwright/robot-file/1"}, {"software", software},     {"files", robot.files},
-          {"robot", to_json(robot.robot)},        {"origins", robot.origins}, {"remarks", robot.remarks}};
+  Json keys = to_json(robot.robot);
+  if (!robot.columns.empty()) {
+    keys["columns"] = robot.columns;
+  }
+  return {{"schema", "wheelwright/robot-file/1"},
+          {"software", software},
+          {"files", robot.files},
+          {"robot", std::move(keys)},
+          {"origins", robot.origins},
+          {"remarks", robot.remarks}};
 }
 
 }  // namespace wheelwright::robots

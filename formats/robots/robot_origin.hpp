@@ -30,6 +30,8 @@ struct RobotWithOrigins {
   std::map<std::string, std::string> origins;  ///< key of the robot file ("nominal.mass") -> its origin
   std::vector<std::string> remarks;            ///< what has no key of its own, or needs the reader's eye
   std::vector<std::string> files;              ///< that were read
+  /// Key `columns`: places of the drive wheels' joints in a JointState, "velocity[left_wheel]".
+  std::map<std::string, std::string> columns{};
 };
 
 /// The robot of a description (nullptr: none) and of a controller's parameters (nullptr: none); at least one is needed.
@@ -45,6 +47,7 @@ struct RobotWithOrigins {
 ///   com_longitudinal or com_lateral (a prior of [a/3, 3a]).
 /// - limits: of effort from the wheels' joints and the plugin; of speed from the joints, and such that no pair of wheel
 ///   speeds within it exceeds a controller's limits, ω <= min(v/r, v2 D/(2r)); of acceleration likewise.
+/// - columns: angle, speed and effort of the joints that drive each side, by their names.
 /// - effort: from the interfaces of the wheels' joints; an effort that is only commanded is held (zero_order).
 ///
 /// Throws InputError, naming file, line and element, for what is missing, contradicts itself or makes no sense.

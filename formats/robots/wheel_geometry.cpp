@@ -160,6 +160,7 @@ constexpr double eccentric = 0.01;    // of the radius
 constexpr double same_radius = 1e-5;  // of the radius
 constexpr double same_centre = 1e-6;  // m
 constexpr const char* kGive = "give --wheel-radius";
+constexpr const char* kAllLinks = "all";  // every link with a shape and no inertial
 
 // The shape that rolls, else the one that says why there is none.
 struct Rolling {
@@ -322,6 +323,9 @@ void require_links(const RobotTree& tree, const std::vector<std::string>& massle
   }
   for (const std::string& name : massless) {
     const TreeLink* link = tree.link(name);
+    if (link == nullptr && name == kAllLinks) {
+      continue;
+    }
     if (link == nullptr) {
       throw InputError(fmt::format("--massless {}: {} has no such link{}", files::shown(name), tree.place.text(),
                                    files::did_you_mean(name, names)));
@@ -330,6 +334,20 @@ void require_links(const RobotTree& tree, const std::vector<std::string>& massle
       link->inertial->place.fail("has a mass, and --massless says that it has none: expected one of both");
     }
   }
+}
+
+void require_masses(const std::vector<const TreeLink*>& bare) {
+  if (bare.empty()) {
+    return;
+  }
+  std::string others, options;
+  for (const TreeLink* link : bare) {
+    others += link == bare.front() ? "" : fmt::format("{}{}", others.empty() ? ", as have " : ", ", link->name);
+    options += fmt::format(" --massless {}", link->name);
+  }
+  bare.front()->place.fail(fmt::format(
+      "has a shape and no <inertial>{}: expected mass and inertia, or{}{}", others, options,
+      bare.size() > 1 ? fmt::format("; where the mass of all {} stands elsewhere, --massless all", bare.size()) : ""));
 }
 
 }  // namespace
@@ -341,14 +359,17 @@ LumpedBody lumped_body(const RobotTree& tree, const WheelJoints& wheels, const A
   for (std::string& name : turning_links(tree, wheels.left)) {
     turning.push_back(std::move(name));
   }
+  std::vector<const TreeLink*> bare;
+  for (const TreeLink& link : tree.links) {
+    if (!link.inertial && !link.shapes.empty() && !holds(massless, link.name) && !holds(massless, kAllLinks)) {
+      bare.push_back(&link);
+    }
+  }
+  require_masses(bare);
   LumpedBody out;
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();
   for (const TreeLink& link : tree.links) {
     if (!link.inertial) {
-      if (!link.shapes.empty() && !holds(massless, link.name)) {
-        link.place.fail(
-            fmt::format("has a shape and no <inertial>: expected mass and inertia, or --massless {}", link.name));
-      }
       out.massless.push_back(link.name);
       continue;
     }

@@ -104,6 +104,13 @@ TEST(RobotOriginErrors, LinksWithoutAMass) {
   RobotHints hints;
   hints.massless = {"camera"};
   EXPECT_EQ(from_urdf(sample_text(camera), hints).robot.nominal, from_urdf(sample_text()).robot.nominal);
+  const std::string lamp =
+      "\n<link name=\"lamp\"><visual><geometry><box size=\"1 1 1\"/></geometry></visual></link>\n<joint name=\"d\" "
+      "type=\"fixed\"><parent link=\"base_link\"/><child link=\"lamp\"/></joint>";
+  EXPECT_THAT(input_error([&] { from_urdf(sample_text(camera + lamp)); }),
+              HasSubstr("as have lamp: expected mass and inertia, or --massless camera --massless lamp"));
+  hints.massless = {"all"};
+  EXPECT_EQ(from_urdf(sample_text(camera + lamp), hints).robot.nominal, from_urdf(sample_text()).robot.nominal);
   hints.massless = {"camra"};
   EXPECT_THAT(input_error([&] { from_urdf(sample_text(camera), hints); }), HasSubstr("did you mean 'camera'?"));
   hints.massless = {"mast"};

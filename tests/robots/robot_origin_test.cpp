@@ -112,6 +112,9 @@ TEST(RobotOrigin, FileReadsBackToTheSameRobotAndEveryValueHasItsOrigin) {
   const std::string text = robot_yaml(made);
   EXPECT_EQ(to_json(parse_robot(text, "robot.yaml")), to_json(made.robot)) << text;
 
+  EXPECT_EQ(made.columns.at("omega_r"), "velocity[right_wheel_joint]");
+  EXPECT_EQ(made.columns.at("tau_l"), "effort[left_wheel_joint]");
+  EXPECT_EQ(to_json(made, "x").at("robot").at("columns"), made.columns);
   EXPECT_EQ(made.robot.encoder_counts_per_turn, 3436.0);
   EXPECT_EQ(made.robot.motor->gear_ratio, 30.0);
   EXPECT_EQ(made.robot.hold, Hold::zero_order);
