@@ -463,6 +463,8 @@ void check_pose_origin(const HealthView& view, std::vector<LogFinding>& out) {
   out.back().unit = origin.heading_repeats ? "rad" : "m";
 }
 
+}  // namespace
+
 void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
   check_angles(view, findings);
   const bool theta = view.column("theta") != nullptr, gyro = view.column("gyro_z") != nullptr;
