@@ -268,7 +268,7 @@ Assumption lost_rows(const Measurement& m, const Survey& survey) {
                .test = "the shortest steps of the log tell two steps from one"};
   const bool apart = m.motion == MotionKind::mean_speed || m.shortest_step <= 0.0 || 2.0 * m.shortest_step > longest;
   a.verdict = longest > 0.0 && apart ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
-  a.detail = fmt::format("a step longer than {:.3g} s begins anew; the longest is {:.3g} s, the median {:.3g} s{}",
+  a.detail = fmt::format("a step longer than {:.3g} s is left out; the longest is {:.3g} s, the median {:.3g} s{}",
                          longest, survey.largest_step, survey.median_step,
                          apart ? "" : ", and steps vary so much that one missing row would not show");
   return a;

@@ -48,6 +48,7 @@ std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const id
 
 SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise, RowUse use) {
   SignalErrors errors = s.declared;
+  errors.bridges = errors.bridges || use == RowUse::driving;
   errors.output.resize(static_cast<Eigen::Index>(noise.size()));
   for (std::size_t i = 0; i < noise.size(); ++i) {
     errors.output[static_cast<Eigen::Index>(i)] = use == RowUse::learning ? noise[i].learning : noise[i].bound;

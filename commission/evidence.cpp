@@ -66,6 +66,7 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   between.acceleration.setZero();
   between.speed.setZero();
   between.output.setZero();
+  between.bridges = false;  // as rows of the fit are
   TorqueRows fitted_stream = make_rows(log, s, errors_of_fit(s));
   const RegressionBlock rows = first_rows(fitted_stream, most_rows);
   TorqueRows bounded_stream = make_rows(log, s, between);

@@ -134,7 +134,7 @@ identify::RegressionMoments log_moments(LogSource& log, const Setting& s, Part p
 
 filter::SignalErrors errors_of_fit(const Setting& s) {
   filter::SignalErrors errors = s.declared;
-  errors.between_samples = false;
+  errors.between_samples = errors.bridges = false;
   return errors;
 }
 

@@ -317,6 +317,9 @@ class Learner {
           }
           for (b = 0; b < count; ++b) {
             g = foreseen[b].value();
+            if (!filter_.element().known) {
+              g.setZero();
+            }
             weigh(g, blocks, phases, stretches_[stretch], t, true);
             weights[b].take(filter_, g, sink);
             weigh(g, blocks, phases, stretches_[stretch], t, false);
@@ -393,7 +396,8 @@ class Learner {
           }
           for (Eigen::Index d = 0; d < count; ++d) {
             const Phase& phase = phases[block[static_cast<std::size_t>(d)]];
-            const double share = phase.in_use() ? taper(stretches_[stretch], phase.from(), t) : 0.0;
+            const double share =
+                phase.in_use() && filter_.element().known ? taper(stretches_[stretch], phase.from(), t) : 0.0;
             g.col(d).noalias() =
                 foreseen[of[static_cast<std::size_t>(d)]].value() * (share * directions[static_cast<std::size_t>(d)]);
           }

@@ -60,6 +60,9 @@ class OldElements {
       waiting_.pop_front();
     }
     const filter::WeakElement& e = elements.element();
+    if (!e.known) {
+      return;
+    }
     waiting_.push_back({e.t, e.length, zero_});
     filter::element_regressor(elements, e, Y_);
     waiting_.back().signals.col(0) = e.torque;
@@ -168,6 +171,9 @@ SerialCorrelation serial_correlation(LogSource& log, filter::ElementFilter eleme
           const Eigen::RowVectorXd mean = joint * old.mean(static_cast<std::size_t>(k / joints));
           g.col(k * width) = (mean[0] - mean.tail(p).dot(box.middle)) * joint.transpose();
           g.middleCols(k * width + 1, p) = joint.transpose() * mean.tail(p);
+        }
+        if (!elements.element().known) {
+          g.setZero();
         }
         weights.take(elements, g, sink);
         summation.take(elements, g);

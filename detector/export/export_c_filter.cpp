@@ -156,9 +156,14 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds, bool sums
   interpolated_ = bounds_ && moved_ && viscous_;
   moving_ = (bounds_ || sums_) && moved_ && viscous_;
   lost_ = measurement_.longest_step() > 0.0;
+  bridged_ = filter.bridges();
+  restarted_ = lost_ && !bridged_;
   first_error_ =
       bounds_ && nodes_ && errors_.joint_sample > 0.0 && lost_ && inertial_ && any_not_zero(errors_.speed_sample);
-  start_ = nodes_ && (first_error_ || interpolated_ || lost_);
+  start_ = nodes_ && (first_error_ || interpolated_ || restarted_);
+  rough_ = bounds_ && bridged_ && !(errors_.joint_sample > 0.0) && any_not_zero(errors_.output);
+  cut_ = bounds_ && bridged_ && any_not_zero(errors_.speed_sample) && (inertial_ || (nodes_ && viscous_));
+  edge_ = cut_ || rough_;
   area_ = bounds_ && bounded_ && any_not_zero(errors_.output);
   joint_error_ = joints_;
   speed_error_ = (mobile_ && viscous_) || heading_ || uses({TermShape::sign_of_speed});
@@ -188,9 +193,12 @@ std::string FilterWriter::segment_words() const {
   }
   return fmt::format(
       "A time that does not increase, or a gap of more than five steps of {:.6g} s, restarts the\n"
-      " * detector; after a step of more than {:.6g} s (rows are lost) the filter has to settle anew{}.",
-      measurement_.nominal_step, measurement_.longest_step(),
-      mobile_ && !limited_ && viscous_ ? ", as it has after a step\n * that is too long for the robot's friction" : "");
+      " * detector; {} of more than {:.6g} s (rows are lost) {}{}.",
+      measurement_.nominal_step, bridged_ ? "a step" : "after a step", measurement_.longest_step(),
+      bridged_ ? "is left out of what is summed up" : "the filter has to settle anew",
+      !(mobile_ && !limited_ && viscous_) ? ""
+      : bridged_ ? ".\n * The filter has to settle anew after a step that is too long for the robot's friction"
+                 : ", as it has after a step\n * that is too long for the robot's friction");
 }
 
 std::string FilterWriter::libm_words() const {
@@ -210,11 +218,11 @@ std::string FilterWriter::constants() const {
     out.line("#define PFX_SLOW {}", hex(kernel_.slow()));
     out.line("#define PFX_QUICK {}", hex(kernel_.gamma() / (apart * apart)));
   }
-  out.line_if(interpolated_ && nodes_, "#define PFX_SLOPE {} /* gain of the kernel's slope */",
+  out.line_if((interpolated_ || cut_) && nodes_, "#define PFX_SLOPE {} /* gain of the kernel's slope */",
               hex(kernel_.gain() * kernel_.majorant_gain()));
   out.line_if(area_, "#define PFX_STATIC_GAIN {}", hex(design.static_gain()));
   out.line_if(nodes_, "#define PFX_SETTLE {} /* rows before this over beta are left out */", hex(design.settle));
-  out.line_if(nodes_ && lost_, "#define PFX_SETTLED_START {} /* ... unless the beginning weighs less */",
+  out.line_if(nodes_ && restarted_, "#define PFX_SETTLED_START {} /* ... unless the beginning weighs less */",
               hex(1.0 + std::exp(-2.0)));
   out.line_if(measurement_.count > 0.0, "#define PFX_COUNT {} /* speeds are whole multiples of this */",
               hex(measurement_.count));
@@ -222,6 +230,10 @@ std::string FilterWriter::constants() const {
     out.line("#define PFX_NOMINAL {} /* s, step of the log */", hex(measurement_.nominal_step));
     out.line("#define PFX_GAP {} /* s: a longer step starts anew */", hex(5.0 * measurement_.nominal_step));
     out.line("#define PFX_LONGEST {} /* s: in a longer step rows are lost */", hex(measurement_.longest_step()));
+    out.line_if(bridged_ && nodes_, "#define PFX_SOFT {} /* 1/s, of weights beside steps that are left out */",
+                hex(filter_.softness()));
+    out.line_if(rough_, "#define PFX_ROUGH {} /* noise beside that of a whole row, where steps are left out */",
+                hex(filter_.per_edge()));
   }
   out.line_if(moved_, "#define PFX_UP {} /* above the rounding of a handful of sums */", hex(kOutward));
   return out.take();
@@ -230,13 +242,14 @@ std::string FilterWriter::constants() const {
 std::string FilterWriter::types() const {
   Text out;
   out.put(!nodes_                           ? (filter_.design().order == 1 ? kFirstOrderKernel : kSpeedKernel)
+          : bridged_                        ? kSoftKernel
           : measurement_.nominal_step > 0.0 ? kSmoothKernel
                                             : kNodeKernel);
   out.put("\n");
   out.put(kFade);
   out.line("    if (fabs(x) < {}) {{", hex(filter::kTrace));
   out.put(kFaded);
-  if (interpolated_ && nodes_) {
+  if ((interpolated_ || cut_) && nodes_) {
     out.put(kMajorant);
     out.put("\n");
   }
@@ -246,6 +259,7 @@ std::string FilterWriter::types() const {
   out.line_if(measured_heading_, "  double heading; /* rad */");
   out.put("} pfx_sample;\n\n/* One step between two samples. */\ntypedef struct pfx_span {\n");
   out.line("  double length; /* s */");
+  out.line_if(bridged_, "  int known; /* 0: efforts in it are not */");
   out.line("  double speed[PFX_COORDINATES]; /* mean over the step */");
   out.line_if(speed_error_, "  double speed_error[PFX_COORDINATES]; /* what the samples are wrong by */");
   out.line_if(joints_, "  double joint_speed[PFX_JOINTS], joint_error;");
@@ -264,8 +278,8 @@ std::string FilterWriter::types() const {
   out.line("  int samples, instants; /* samples, and instants of the recursion, in this segment: counted up to 3 */");
   out.line("  int began; /* with the last sample a segment's first step is known */");
   if (nodes_) {
-    out.line("  int at_rest{}; /* the segment began at standstill{} */", lost_ ? ", after_loss" : "",
-             lost_ ? ", after lost rows" : "");
+    out.line("  int at_rest{}; /* the segment began at standstill{} */", restarted_ ? ", after_loss" : "",
+             restarted_ ? ", after lost rows" : "");
   } else {
     out.line("  double speed[PFX_COORDINATES], speed_before[PFX_COORDINATES]; /* at the last two samples */");
   }
@@ -277,6 +291,9 @@ std::string FilterWriter::types() const {
       "} pfx_elements;\n\n/* The equation of motion times a weight, integrated: a hat at a sample, or a whole step. "
       "*/\ntypedef struct pfx_element {\n");
   out.line("  double t, length, before, step; /* s: its instant, integral of the weight, steps around it */");
+  out.line_if(bridged_, "  int known; /* 0: it holds a step of unknown effort and is left out */");
+  out.line_if(bridged_, "  int run_begins{}; /* it is the first such{} */", nodes_ ? ", run_ends" : "",
+              nodes_ ? ", the last" : "");
   out.line_if(viscous_, "  double motion[PFX_COORDINATES]; /* of the speeds */");
   out.line_if(inertial_, "  double slope[PFX_COORDINATES]; /* of their derivatives */");
   out.line("  double torque[PFX_CHANNELS]{};", doubted_ ? ", torque_doubt[PFX_CHANNELS]" : "");
@@ -300,6 +317,16 @@ std::string FilterWriter::types() const {
     out.line("  pfx_cascade motion_doubt[PFX_COORDINATES]; /* speeds between samples */");
   }
   out.line_if(area_, "  pfx_cascade area; /* of the kernel */");
+  if (bridged_ && nodes_) {
+    out.line("  double left, decay_before; /* part of the weight that the newest element lacks; of the step before */");
+    out.line_if(edge_ || interpolated_, "  double slope_before; /* of such a part */");
+    out.line_if(edge_, "  double rate, cross; /* slope of that part; what it makes of the weights' own */");
+    out.line_if(interpolated_, "  double doubt_before[PFX_COORDINATES];");
+    out.line_if(interpolated_, "  pfx_cascade edge_doubt[PFX_COORDINATES];");
+    out.line_if(cut_, "  pfx_cascade whole; /* by how much weights vary more */");
+    out.line_if(cut_, "  pfx_majorant turn; /* slope of the kernel where it is cut */");
+  }
+  out.line_if(edge_, "  pfx_cascade edge; /* by how much {} */", nodes_ ? "their slope does" : "weights vary more");
   if (start_) {
     out.line("  pfx_cascade start; /* weight of the segment's beginning */");
     out.line("  double first_length; /* s, of the first step */");
@@ -651,7 +678,7 @@ void FilterWriter::describe(Text& out) const {
   const bool odometry = heading_ && !measured_heading_ && model_.heading_coordinate >= 0;
   const bool next = mean_ && (hull_ ? true : !held_ && (!between_ || change_));
   const bool step_error = nodes_ && errors_.joint_sample > 0.0;
-  const bool before = !mean_ || !lost_ || measured_heading_ || held_ || change_ || split_;
+  const bool before = !mean_ || !lost_ || bridged_ || measured_heading_ || held_ || change_ || split_;
   out.put(
       "\n/* The step between two samples, as far as they tell; 0 where no bounds on its motion can be given. */\n"
       "static inline int pfx_describe(pfx_elements *s)\n{\n");
@@ -663,7 +690,11 @@ void FilterWriter::describe(Text& out) const {
   out.line("  double joint_speed[PFX_JOINTS], falling[PFX_JOINTS]{}{};", split_ ? ", rising[PFX_JOINTS]" : "",
            change_ ? ", range[PFX_JOINTS]" : "");
   out.line("  int i;");
-  out.line("  p->length = {};", mean_ && lost_ ? "PFX_NOMINAL" : "now->t - before->t");
+  if (mean_ && bridged_) {
+    out.line("  p->length = now->t - before->t > PFX_LONGEST ? now->t - before->t : PFX_NOMINAL;");
+  } else {
+    out.line("  p->length = {};", mean_ && lost_ ? "PFX_NOMINAL" : "now->t - before->t");
+  }
   out.line("  for (i = 0; i < PFX_JOINTS; ++i) {{");
   out.line("    joint_speed[i] = {};", angle_  ? "(now->joint[i] - before->joint[i]) / p->length"
                                        : mean_ ? "now->joint[i]"
@@ -701,6 +732,18 @@ void FilterWriter::describe(Text& out) const {
         out.line("  }}");
       }
     }
+  }
+  if (bridged_) {
+    out.line("  p->known = !(now->t - before->t > PFX_LONGEST{});",
+             mean_ && !(held_ && !between_) ? " || s->sample[0].t - now->t > PFX_LONGEST" : "");
+    out.line("  if (!p->known) {{");
+    if (moved_) {
+      out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");
+      out.line("      p->acceleration[i] = 0.0;");
+      out.line("    }}");
+    }
+    out.line("    return 1;");
+    out.line("  }}");
   }
   measure_effort(out);
   if (moved_) {
@@ -791,6 +834,33 @@ void FilterWriter::curve(Text& out) const {
   out.put("}\n");
 }
 
+// The element where efforts of a step of it are not known.
+void FilterWriter::make_unknown(Text& out) const {
+  if (!bridged_) {
+    return;
+  }
+  const bool doubts = moving_ && nodes_;
+  out.put(
+      "\n/* The same where the efforts of a step are not known. */\n"
+      "static inline void pfx_make_unknown(const pfx_elements *s, pfx_element *e)\n{\n");
+  out.line("  const pfx_span *p = &s->span[s->newest], *last = &s->span[!s->newest];");
+  out.line("  const double h = p->length;");
+  out.line_if(doubts, "  int i;");
+  out.line("  memset(e, 0, sizeof *e);");
+  out.line("  e->t = s->t{};", nodes_ ? " - h" : "");
+  out.line("  e->before = {};", nodes_ ? "last->length" : "h");
+  out.line("  e->step = h;");
+  out.line("  e->run_begins = {}last->known;", nodes_ ? "" : "s->instants == 2 || ");
+  out.line_if(nodes_, "  e->run_ends = p->known;");
+  if (doubts) {
+    out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
+    out.line("    e->motion_doubt[i] = p->acceleration[i] * pfx_cube(h) / 12.0;");
+    out.line_if(sums_, "    e->motion_doubt_before[i] = last->acceleration[i] * pfx_cube(last->length) / 12.0;");
+    out.line("  }}");
+  }
+  out.put("}\n");
+}
+
 void FilterWriter::make_hat(Text& out) const {
   const char* rising = split_ ? "rising" : "falling";
   out.put(
@@ -805,6 +875,14 @@ void FilterWriter::make_hat(Text& out) const {
     out.line("  double curve[PFX_CHANNELS];");
   }
   out.line("  int i;");
+  if (bridged_) {
+    out.line("  if (!p->known || !last->known) {{");
+    out.line("    pfx_make_unknown(s, e);");
+    out.line("    return;");
+    out.line("  }}");
+    out.line("  e->known = 1;");
+    out.line("  e->run_begins = e->run_ends = 0;");
+  }
   if (curved) {
     out.line("  pfx_curve(s, before, h, least, curve{});",
              doubted_ ? ", least < rest ? rest : least, e->torque_doubt" : "");
@@ -842,6 +920,14 @@ void FilterWriter::make_step(Text& out) const {
   out.line("  const double h = p->length;");
   out.line_if(linear_, "  double curve[PFX_CHANNELS];");
   out.line("  int i;");
+  if (bridged_) {
+    out.line("  if (!p->known) {{");
+    out.line("    pfx_make_unknown(s, e);");
+    out.line("    return;");
+    out.line("  }}");
+    out.line("  e->known = 1;");
+    out.line("  e->run_begins = 0;");
+  }
   if (linear_) {
     out.line("  if (s->instants > 2) {{");
     out.line("    const int even = fabs(h - last->length) <= {} * h;", hex(kAlikeSteps));
@@ -886,6 +972,7 @@ void FilterWriter::make(Text& out) const {
   if ((linear_ && !mean_) || (moving_ && nodes_)) {
     out.put("\nstatic inline double pfx_cube(double x)\n{\n  return x * x * x;\n}\n");
   }
+  make_unknown(out);
   curve(out);
   if (nodes_) {
     make_hat(out);
@@ -895,36 +982,109 @@ void FilterWriter::make(Text& out) const {
   }
 }
 
+// RegressorFilter::cut_out().
+void FilterWriter::cut_out(Text& out) const {
+  if (!bridged_ || !nodes_) {
+    return;
+  }
+  out.put(
+      "\n/* Weights end before elements that are left out and begin behind them, each by and by. */\n"
+      "static inline void pfx_cut_out(pfx_memory *m, const pfx_weights *w, const pfx_element *e)\n{\n");
+  const bool slopes = edge_ || interpolated_;
+  out.line("  const double decay = w->soft{};", slopes ? ", gone = 1.0 - decay, slope = gone / e->step" : "");
+  out.line_if(slopes, "  const int goes_on = e->known || e->run_ends;");
+  out.line("  double left = 1.0{}{};", edge_ ? ", edge = 0.0" : "", cut_ ? ", whole = 0.0, turn = 0.0" : "");
+  out.line_if(slopes, "  double rate;");
+  out.line("  int i;");
+  out.line("  if (e->run_begins) {{");
+  out.line_if(edge_, "    edge = 2.0 * (m->slope_before + m->cross);");
+  out.line_if(cut_, "    whole = turn = 1.0;");
+  out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");
+  out.line_if(viscous_, "      pfx_cut(&m->motion[i]);");
+  out.line_if(inertial_, "      pfx_cut(&m->slope[i]);");
+  out.line("    }}");
+  out.line("    for (i = 0; i < PFX_CHANNELS; ++i) {{");
+  out.line("      pfx_cut(&m->torque[i]);");
+  out.line_if(doubt_, "      pfx_cut(&m->torque_doubt[i]);");
+  out.line("    }}");
+  if (!functions_.empty()) {
+    out.line("    for (i = 0; i < {}; ++i) {{", functions_.size());
+    out.line("      pfx_cut(&m->term[i]);");
+    out.line_if(bounds_, "      pfx_cut(&m->term_error[i]);");
+    out.line("    }}");
+  }
+  out.line_if(area_, "    pfx_cut(&m->area);");
+  out.line_if(start_, "    pfx_cut(&m->start);");
+  out.line("  }}");
+  out.line("  if (e->known) {{");
+  out.line("    left = m->decay_before * m->left;");
+  out.line_if(cut_, "    turn += 2.0 * (m->left - left);");
+  out.line_if(cut_, "    whole += m->left - left;");
+  out.line("  }}");
+  out.line_if(slopes, "  rate = goes_on ? left * slope : 0.0;");
+  if (edge_) {
+    out.line("  if (goes_on) {{");
+    out.line("    edge += fabs(rate - m->rate);");
+    out.line("  }}");
+  }
+  if (interpolated_) {
+    out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
+    out.line("    pfx_take(&m->edge_doubt[i], w, (e->run_begins ? m->doubt_before[i] : 0.0) + rate * e->motion_doubt[i]);");
+    out.line("    m->doubt_before[i] = goes_on ? decay * m->doubt_before[i] + slope * e->motion_doubt[i] : 0.0;");
+    out.line("  }}");
+  }
+  if (edge_) {
+    out.line("  m->cross = goes_on ? decay * m->cross + left * gone * slope : 0.0;");
+    out.line("  pfx_take(&m->edge, w, edge);");
+    out.line("  m->rate = rate;");
+  }
+  if (cut_) {
+    out.line("  pfx_take(&m->whole, w, whole);");
+    out.line("  pfx_majorant_take(&m->turn, w->decay, PFX_BETA * e->step, turn);");
+  }
+  out.line("  m->left = left;");
+  out.line("  m->decay_before = decay;");
+  out.line_if(slopes, "  m->slope_before = slope;");
+  out.put("}\n");
+}
+
 void FilterWriter::advance(Text& out) const {
   out.put(
       "\n/* An element goes through the filter. */\n"
       "static inline void pfx_advance(pfx_state *s, const pfx_element *e)\n{\n");
   out.line("  const pfx_weights *w = &s->weights;");
   out.line("  pfx_memory *m = &s->memory;");
+  out.line_if(bridged_ && nodes_, "  double share; /* of the element's weight */");
   out.line("  int i;");
   out.line("  s->fading = (s->fading + 1) % {};", filter::kFade);
   out.line("  if (s->fading == 0) {{");
   out.line("    pfx_fade(m, sizeof *m);");
   out.line("  }}");
+  const std::string share = bridged_ && nodes_ ? "share * " : "";
+  if (bridged_ && nodes_) {
+    out.line("  pfx_cut_out(m, w, e);");
+    out.line("  share = e->known && m->left > 0.0 ? 1.0 - m->left : 1.0;");
+  }
   out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
-  out.line_if(viscous_, "    pfx_take(&m->motion[i], w, e->motion[i]);");
-  out.line_if(inertial_, "    pfx_take(&m->slope[i], w, e->slope[i]);");
+  out.line_if(viscous_, "    pfx_take(&m->motion[i], w, {}e->motion[i]);", share);
+  out.line_if(inertial_, "    pfx_take(&m->slope[i], w, {}e->slope[i]);", share);
   out.line_if(interpolated_ && nodes_,
               "    pfx_majorant_take(&m->motion_doubt[i], w->decay, PFX_BETA * e->step, e->motion_doubt[i]);");
   out.line_if(interpolated_ && !nodes_, "    pfx_take(&m->motion_doubt[i], w, e->motion_doubt[i]);");
   out.line("  }}");
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
-  out.line("    pfx_take(&m->torque[i], w, e->torque[i]);");
-  out.line_if(doubt_, "    pfx_take(&m->torque_doubt[i], w, e->torque_doubt[i]);");
+  out.line("    pfx_take(&m->torque[i], w, {}e->torque[i]);", share);
+  out.line_if(doubt_, "    pfx_take(&m->torque_doubt[i], w, {}e->torque_doubt[i]);", share);
   out.line("  }}");
   if (!functions_.empty()) {
     out.line("  for (i = 0; i < {}; ++i) {{", functions_.size());
-    out.line("    pfx_take(&m->term[i], w, e->term[i]);");
-    out.line_if(bounds_, "    pfx_take(&m->term_error[i], w, e->term_error[i]);");
+    out.line("    pfx_take(&m->term[i], w, {}e->term[i]);", share);
+    out.line_if(bounds_, "    pfx_take(&m->term_error[i], w, {}e->term_error[i]);", share);
     out.line("  }}");
   }
-  out.line_if(area_, "  pfx_take(&m->area, w, e->length);");
+  out.line_if(area_, "  pfx_take(&m->area, w, {}e->length);", share);
   out.line_if(start_, "  pfx_take(&m->start, w, s->elements.instants == 2 ? 1.0 : 0.0);");
+  out.line_if(edge_ && !nodes_, "  pfx_take(&m->edge, w, e->run_begins ? 2.0 : 0.0);");
   out.put("}\n");
 }
 
@@ -941,14 +1101,14 @@ void FilterWriter::take_sample(Text& out) const {
   out.put("}\n");
   out.put("\n/* The next sample starts a segment. */\nstatic inline void pfx_forget(pfx_elements *s)\n{\n");
   out.line("  s->samples = s->instants = 0;");
-  out.line_if(nodes_ && lost_, "  s->after_loss = 0;");
+  out.line_if(nodes_ && restarted_, "  s->after_loss = 0;");
   out.put(
       "}\n\n/* Takes one sample; whether there is an element. */\n"
       "static inline int pfx_take_sample(pfx_elements *s, double t, const double *input)\n{\n");
   out.line_if(nodes_, "  const pfx_span *p;");
   out.line("  int i;");
   out.line("  s->began = 0;");
-  if (lost_) {
+  if (restarted_) {
     out.line("  if (s->samples > 0 && t - s->sample[0].t > PFX_LONGEST) {{ /* nothing is known of the effort in it */");
     out.line("    pfx_forget(s);");
     out.line_if(nodes_, "    s->after_loss = 1;");
@@ -977,11 +1137,14 @@ void FilterWriter::take_sample(Text& out) const {
   out.line("  }}");
   out.line_if(nodes_, "  p = &s->span[s->newest];");
   out.line("  s->instants += s->instants < 3;");
-  out.line("  s->t = s->sample[{}].t{};", ahead_, mean_ ? " + 0.5 * p->length" : "");
+  out.line("  s->t = s->sample[{}].t{};", ahead_,
+           !mean_     ? ""
+           : bridged_ ? " + 0.5 * PFX_NOMINAL"
+                      : " + 0.5 * p->length");
   out.line("  if (s->instants == {}) {{", nodes_ ? 1 : 2);
   out.line("    s->began = 1;");
   if (nodes_) {
-    out.line("    s->at_rest = 1;");
+    out.line("    s->at_rest = {};", bridged_ ? "p->known" : "1");
     out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");
     out.line("      s->at_rest = s->at_rest && fabs(p->speed[i]) <= 0.0;");
     out.line("    }}");
@@ -1008,6 +1171,8 @@ void FilterWriter::filter(Text& out) const {
   out.line("    memset(&s->memory, 0, sizeof s->memory);");
   out.line("    s->fading = 0;");
   out.line_if(start_, "    s->memory.first_length = p->length;");
+  out.line_if(bridged_ && nodes_ && (edge_ || interpolated_),
+              "    s->memory.slope_before = (1.0 - exp(-PFX_SOFT * p->length)) / p->length;");
   if (first_doubt) {
     out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");
     out.line("      s->memory.first_doubt[i] = p->acceleration[i] * p->length * p->length / 12.0;");
@@ -1023,7 +1188,7 @@ void FilterWriter::filter(Text& out) const {
   if (nodes_) {
     out.line("  since = all->t - all->t0;");
     out.line("  return all->at_rest || since * PFX_BETA >= PFX_SETTLE{};",
-             lost_ ? " ||\n         (all->after_loss && since * PFX_BETA >= 1.0 &&\n"
+             restarted_ ? " ||\n         (all->after_loss && since * PFX_BETA >= 1.0 &&\n"
                      "          pfx_value(&s->memory.start) / (PFX_GAIN * s->memory.first_length) <= PFX_SETTLED_START)"
                    : "");
   } else {
@@ -1048,8 +1213,23 @@ void FilterWriter::row(Text& out) const {
         "  /* The kernel rises from 0 to the weight of the first node: the slope of that has errors of its own. */");
     out.line("  const double first = start > 0.0 ? start * PFX_NOMINAL / m->first_length : 0.0;");
   }
+  if (cut_) {
+    out.line("  /* What is left out: in units of the error of a sample of the speed. */");
+    if (nodes_) {
+      out.line("  const double half = 0.5 * PFX_NOMINAL;");
+      out.line_if(inertial_,
+                  "  const double edge = half * (pfx_value(&m->edge) + PFX_SLOPE * pfx_majorant_value(&m->turn));");
+      out.line_if(viscous_, "  const double whole = half * pfx_value(&m->whole);");
+    } else {
+      out.line("  const double edge = pfx_value(&m->edge);");
+    }
+  }
+  const std::string rougher = rough_ ? "(1.0 + pfx_value(&m->edge) * PFX_ROUGH)" : "";
   if (area_) {
-    out.line("  const double gain = pfx_value(&m->area) / PFX_STATIC_GAIN, area = 1.0 < gain ? gain : 1.0;");
+    out.line("  const double gain = pfx_value(&m->area) / PFX_STATIC_GAIN, area = {};",
+             rough_ ? "(1.0 < gain ? gain : 1.0) *\n      " + rougher : "1.0 < gain ? gain : 1.0");
+  } else if (rough_) {
+    out.line("  const double area = {}; /* errors of the motion are not known */", rougher);
   }
   out.line("  int i, j;");
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
@@ -1060,7 +1240,7 @@ void FilterWriter::row(Text& out) const {
   out.line("      y[i][j] = {}0.0;", bounds_ ? "dy[i][j] = " : "");
   out.line("    }}");
   out.line("    torque[i] = pfx_value(&m->torque[i]);");
-  out.line_if(bounds_, "    torque_error[i] = {}noise[i]{};", area_ ? "area * " : "",
+  out.line_if(bounds_, "    torque_error[i] = {}noise[i]{};", area_ || rough_ ? "area * " : "",
               doubt_ ? " + pfx_value(&m->torque_doubt[i])" : "");
   out.line("  }}");
   for (const Term& term : model_.terms) {
@@ -1073,15 +1253,21 @@ void FilterWriter::row(Text& out) const {
              speed ? "motion" : "slope", term.coordinate, plain(model_.parameters[term.parameter].name));
     const double constant = speed ? errors_.speed[c] : errors_.acceleration[c];
     std::string error = hex(constant);
+    const bool cut = speed && cut_ && nodes_;
+    if (cut) {
+      error += fmt::format(" + whole * {}", hex(errors_.speed_sample[c]));
+    }
     if (speed && interpolated_) {
       error += nodes_ ? fmt::format(
                             " + (PFX_SLOPE * pfx_majorant_value(&m->motion_doubt[{0}]) +\n"
-                            "      start * m->first_doubt[{0}])",
-                            term.coordinate)
+                            "      start * m->first_doubt[{0}]{1})",
+                            term.coordinate,
+                            bridged_ ? fmt::format(" + pfx_value(&m->edge_doubt[{}])", term.coordinate) : "")
                       : fmt::format(" + pfx_value(&m->motion_doubt[{}])", term.coordinate);
-    } else if (!speed && first_error_) {
-      error += fmt::format(" + first * {}", hex(errors_.speed_sample[c]));
-    } else if (constant == 0.0) {
+    } else if (!speed && (first_error_ || cut_)) {
+      error += fmt::format(" + {} * {}", !cut_ ? "first" : first_error_ ? "(first + edge)" : "edge",
+                           hex(errors_.speed_sample[c]));
+    } else if (constant == 0.0 && !cut) {
       continue;
     }
     const double scale = std::abs(term.scale);
@@ -1106,6 +1292,7 @@ std::string FilterWriter::functions() const {
   describe(out);
   make(out);
   take_sample(out);
+  cut_out(out);
   advance(out);
   filter(out);
   row(out);

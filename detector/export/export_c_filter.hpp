@@ -45,6 +45,8 @@ class FilterWriter {
   /// Which members an element has beside motion, slope, torque: torque_doubt, motion_doubt.
   [[nodiscard]] bool doubted() const { return doubted_; }
   [[nodiscard]] bool moving() const { return moving_; }
+  /// True if a segment goes on where rows are lost (ElementFilter::bridges): elements say whether they are known.
+  [[nodiscard]] bool bridged() const { return bridged_; }
 
  private:
   struct FunctionTerm {
@@ -63,9 +65,11 @@ class FilterWriter {
   void measure_effort(Text& out) const;
   void change(Text& out) const;
   void curve(Text& out) const;
+  void make_unknown(Text& out) const;
   void make_hat(Text& out) const;
   void make_step(Text& out) const;
   void make(Text& out) const;
+  void cut_out(Text& out) const;
   void advance(Text& out) const;
   void take_sample(Text& out) const;
   void filter(Text& out) const;
@@ -104,8 +108,10 @@ class FilterWriter {
   bool doubted_ = false, moving_ = false;
   // error of a segment's first slope; weight of its first node; area of the kernel
   bool first_error_ = false, start_ = false, area_ = false;
-  // lost rows are known from the length of a step
-  bool lost_ = false;
+  // lost rows are known from the length of a step; a segment goes on there, or begins anew
+  bool lost_ = false, bridged_ = false, restarted_ = false;
+  // what is left out there counts in dy alone; by errors of the motion
+  bool rough_ = false, cut_ = false, edge_ = false;
   // of a step's mean
   bool speed_error_ = false, joint_error_ = false;
   std::size_t samples_ = 2;            // that are remembered

@@ -85,7 +85,7 @@ static inline void pfx_foresee(pfx_sums *s, const pfx_element *e)
       s->foreseen[i][j] = last + PFX_LEAD * (s->stage[PFX_STAGES - 2][i][j] - last);
     }
   }
-  if (s->waiting_count == PFX_WAITING) { /* steps are shorter than they were said to be */
+  if (LEFT_OUT) { /* steps are shorter than they were said to be LOST*/
     return;
   }
   next = &s->waiting[(s->oldest + s->waiting_count) % PFX_WAITING];
@@ -132,7 +132,6 @@ static inline void pfx_weigh(pfx_sums *s, const pfx_element *e)
   for (i = 0; i < PFX_CHANNELS; ++i) {
     pfx_weighted(s, pfx_slope_gain[i], s->c[i]);
   }
-}
 )";
 
 // averaged_radius().
@@ -296,6 +295,9 @@ typedef struct pfx_sums {
   if (elements_.nodes()) {
     text += line("  double before; /* s, the step before the newest element */");
   }
+  if (elements_.bridged()) {
+    text += line("  double cut[PFX_SUMS]; /* what leaving the newest element out adds to errors */");
+  }
   if (polytope_ && !sums_.rule().table()->graphs().empty()) {
     text += line("  unsigned short place[{}][PFX_RISK_SLOTS]; /* the vertex that was best last time */",
                  sums_.rule().table()->graphs().size());
@@ -329,7 +331,14 @@ std::string SumsWriter::tables() const {
   return text;
 }
 
-std::string SumsWriter::foresee() const { return elements_.regressor() + std::string(kBegin) + std::string(kForesee); }
+std::string SumsWriter::foresee() const {
+  std::string text(kForesee);
+  const auto put = [&](std::string_view name, std::string_view by) { text.replace(text.find(name), name.size(), by); };
+  const bool bridged = elements_.bridged();
+  put("LEFT_OUT", bridged ? "s->waiting_count == PFX_WAITING || !e->known" : "s->waiting_count == PFX_WAITING");
+  put("LOST", bridged ? "or nothing is known of it " : "");
+  return elements_.regressor() + std::string(kBegin) + text;
+}
 
 std::string SumsWriter::weigh() const {
   return R"(
@@ -357,7 +366,31 @@ static inline double pfx_to_joint(int j, const double *channel)
   }
   return sum;
 }
-)" + std::string(kWeigh);
+)" + std::string(kWeigh) +
+         left_out() + "}\n";
+}
+
+// Lines of pfx_weigh: an element that is not known is taken away from a sum that is smooth.
+std::string SumsWriter::left_out() const {
+  if (!elements_.bridged()) {
+    return "";
+  }
+  const double size =
+      2.0 * risk_.errors.motion.bound * std::sqrt(static_cast<double>(model_.joints.size()));
+  std::string text = "  memset(s->cut, 0, sizeof s->cut);\n  if (!e->known) {\n";
+  text += line("    const double by = {}{};", hex(size),
+               elements_.nodes() ? " * (1.0 / e->before + 1.0 / e->step)" : "");
+  text += R"(    for (j = 0; j < PFX_SUMS; ++j) {
+      double sum = s->c[0][j] * s->c[0][j];
+      for (i = 1; i < PFX_CHANNELS; ++i) {
+        sum += s->c[i][j] * s->c[i][j];
+      }
+      s->cut[j] = by * sqrt(sum);
+    }
+    memset(s->g, 0, sizeof s->g);
+  }
+)";
+  return text;
 }
 
 // Lines of pfx_sums_take: what stands beside a sum for certain.
@@ -366,7 +399,8 @@ std::string SumsWriter::worst() const {
   const double effort = constants_.averages ? risk_.errors.effort.bias : risk_.errors.effort.bound;
   std::string text;
   const auto each = [&](const std::string& body) { text += "  for (w = 0; w < PFX_SUMS; ++w) {\n" + body + "  }\n"; };
-  each(fmt::format("    straight[w] = {} * fabs(residual[w]);\n    turning[w] = efforts[w] = 0.0;\n", hex(kRoundings)));
+  each(fmt::format("    straight[w] = {} * fabs(residual[w]){};\n    turning[w] = efforts[w] = 0.0;\n", hex(kRoundings),
+                   elements_.bridged() ? " + s->cut[w]" : ""));
   text += "  for (j = 0; j < PFX_PARAMETERS; ++j) {\n    for (w = 0; w < PFX_SUMS; ++w) {\n";
   text += "      straight[w] += pfx_rounded[j] * fabs(rows[j][w]);\n    }\n  }\n";
   text += "  for (j = 0; j < PFX_JOINTS; ++j) {\n    for (w = 0; w < PFX_SUMS; ++w) {\n";

@@ -31,6 +31,7 @@ class SumsWriter {
  private:
   [[nodiscard]] std::string foresee() const;
   [[nodiscard]] std::string weigh() const;
+  [[nodiscard]] std::string left_out() const;
   [[nodiscard]] std::string worst() const;
   [[nodiscard]] std::string take() const;
   [[nodiscard]] std::string look() const;

@@ -116,6 +116,53 @@ static inline double pfx_value(const pfx_cascade *c)
 }
 )";
 
+const std::string_view kSoftKernel =
+    "/* One filtered signal: sums of impulses with the weights exp(-beta x), x exp(-beta x) and "
+    R"(exp(-gamma x), x their age. */
+typedef struct pfx_cascade {
+  double z1, z2, fast, soft;
+} pfx_cascade;
+
+/* Weights of one step; computed anew only when its length changes. */
+typedef struct pfx_weights {
+  double step, decay, fast, soft;
+} pfx_weights;
+
+static inline void pfx_prepare(pfx_weights *w, double h)
+{
+  if (h != w->step) {
+    w->step = h;
+    w->decay = exp(-(PFX_BETA * h));
+    w->fast = exp(-PFX_GAMMA * h);
+    w->soft = exp(-PFX_SOFT * h);
+  }
+}
+
+/* An impulse q, and then a step. */
+static inline void pfx_take(pfx_cascade *c, const pfx_weights *w, double q)
+{
+  c->z1 += q;
+  c->z2 = w->decay * (c->z2 + w->step * c->z1);
+  c->z1 = w->decay * c->z1;
+  c->fast = w->fast * (c->fast + q);
+  c->soft = w->soft * (c->soft + q);
+}
+
+/* The weights of all impulses so far end here, by and by: soft is what they lose, exp(-PFX_SOFT x) times those now. */
+static inline void pfx_cut(pfx_cascade *c)
+{
+  c->z1 -= c->soft;
+  c->fast -= c->soft;
+  c->soft = 0.0;
+}
+
+/* The filtered signal now. */
+static inline double pfx_value(const pfx_cascade *c)
+{
+  return PFX_GAIN * (PFX_SLOW * c->z2 - PFX_QUICK * (c->z1 - c->fast));
+}
+)";
+
 const std::string_view kNodeKernel =
     R"(/* One filtered signal: sums of impulses with the weights exp(-beta x) and x exp(-beta x), x their age. */
 typedef struct pfx_cascade {

@@ -48,7 +48,7 @@ extern const std::string_view kCompiler;
 /// Types: channel, decision (detector/detector.hpp).
 extern const std::string_view kTypes;
 /// FilterKernel (model/filter/kernel.hpp) for nodes, smoothed and not: state, weights of a step, prepare, take, value.
-extern const std::string_view kSmoothKernel;
+extern const std::string_view kSoftKernel, kSmoothKernel;
 extern const std::string_view kNodeKernel;
 /// exponential_moments() (model/filter/kernel.hpp) as far as speeds need it, and FilterKernel for them: order 1 and 2.
 extern const std::string_view kFirstOrderKernel;

@@ -441,6 +441,9 @@ FaultFilter::FaultFilter(FaultType fault, const Model& model, const FilterDesign
       filtered_(FaultSignals::none(model)) {
   filter::validate(design);
   kernel_ = filter::FilterKernel(design, motion.kind, motion.nominal_step);
+  if (!motion.cuts.empty()) {
+    kernel_.soften();
+  }
   cascades_ = filter::KernelBank(model.n() * (3 * model.p() + 1));
   const auto n = static_cast<Eigen::Index>(model.n());
   from_motion_ = inverse_of(model);
@@ -500,15 +503,17 @@ void fill(FaultSignals& signals, const double* from) {
 void FaultFilter::begin(std::size_t onset) {
   begin_filter(onset);
   elements_.begin(onset);
+  const double held = motion_->held(onset);
   const FaultSignals& jumps = elements_.jump();
   const std::size_t size = static_cast<std::size_t>(jumps.g1.size());
   const auto jump = [&](std::size_t e, double by) {
     cascades_.z1()[e] += by;
     cascades_.fast()[e] += by;
+    cascades_.soft()[e] += by;
   };
   for (std::size_t e = 0; e < size; ++e) {
-    jump(e, jumps.g1.data()[e]);
-    jump(2 * size + e, jumps.s.data()[e]);
+    jump(e, held * jumps.g1.data()[e]);
+    jump(2 * size + e, held * jumps.s.data()[e]);
   }
 }
 
@@ -610,7 +615,11 @@ bool FaultFilter::next() {
   }
   const std::array<double, 2>& shares = elements_.shares();
   const FaultSignals &begin = elements_.at_begin(), &end = elements_.at_end();
-  filter(begin, end, shares, motion_->step[k_ + 1]);
+  const double held = motion_->held(k_);
+  if (motion_->cut_at(k_)) {
+    cascades_.cut(static_cast<std::size_t>(3 * begin.g1.size() + begin.c.size()));
+  }
+  filter(begin, end, {held * shares[0], held * shares[1]}, motion_->step[k_ + 1]);
   widen(begin, end, k_ == onset_ || elements_.sets_in(), std::max(shares[0] + shares[1], motion_->step[k_ + 1]));
   ++k_;
   const auto n = static_cast<Eigen::Index>(model_->n());

@@ -67,7 +67,8 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
       first_(first),
       end_(end),
       gain_(std::pow(design.alpha, design.order)),
-      bound_{FaultSignals::none(model), FaultSignals::none(model), FaultSignals::none(model)} {
+      bound_{FaultSignals::none(model), FaultSignals::none(model), FaultSignals::none(model),
+             FaultSignals::none(model)} {
   check::that(knows(fault, model), "fault '" + fault.name + "'", "a step or a drift");
   check::that(first < end && end <= motion.instants(), "instants", "a range of the motion");
   fault_.held_effort = false;
@@ -77,8 +78,11 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
   for (std::size_t k = first + 1; k < end; ++k) {
     way_[k - first] = way_[k - first - 1] + motion.step[k];
   }
-  state_.assign(end - first, {FaultSignals::none(model), FaultSignals::none(model), FaultSignals::none(model)});
-  state_[0].z1.g1 = state_[0].fast.g1 = jump(first);
+  if (!motion.cuts.empty()) {
+    kernel_.soften();
+  }
+  state_.assign(end - first, bound_);
+  state_[0].z1.g1 = state_[0].fast.g1 = state_[0].soft.g1 = jump(first);
   take(step_);
 }
 
@@ -87,11 +91,12 @@ void OnsetRows::take(const FaultType& fault) {
   filter.begin(first_);
   while (filter.instant() + 1 < end_ && filter.next()) {
     state_[filter.instant() - first_] = {filter.state(&filter::KernelBank::z1), filter.state(&filter::KernelBank::z2),
-                                         filter.state(&filter::KernelBank::fast)};
+                                         filter.state(&filter::KernelBank::fast),
+                                         filter.state(&filter::KernelBank::soft)};
   }
 }
 
-// The impulse that motion beyond v has where a step sets in.
+// The impulse that motion beyond v has where a step sets in, as far as rows hold it.
 core::RowMatrix OnsetRows::jump(std::size_t k) const {
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(motion_->speed.rows());
   if (fault_.motion.size() > 0) {
@@ -104,35 +109,66 @@ core::RowMatrix OnsetRows::jump(std::size_t k) const {
   for (const Term& term : model_->terms) {
     if (term.kind == Term::Kind::acceleration) {
       out(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter)) +=
-          term.scale * moved[static_cast<Eigen::Index>(term.coordinate)];
+          motion_->held(k) * term.scale * moved[static_cast<Eigen::Index>(term.coordinate)];
     }
   }
   return out;
 }
 
+// What is left at instant `to` of a state at instant `from`.
+void OnsetRows::pass(State& state, std::size_t from, std::size_t to) const {
+  while (from < to) {
+    if (motion_->cut_at(from)) {
+      state.z1 = sum(state.z1, -1.0, state.soft);
+      state.fast = sum(state.fast, -1.0, state.soft);
+      state.soft = FaultSignals::none(*model_);
+    }
+    std::size_t end = motion_->cuts.empty() ? to : from + 1;
+    while (end < to && !motion_->cut_at(end)) {
+      ++end;
+    }
+    const double x = way(from, end), decay = std::exp(-design_.beta * x);
+    const FaultSignals none = FaultSignals::none(*model_);
+    state.z2 = sum(sum(none, decay, state.z2), decay * x, state.z1);
+    state.z1 = sum(none, decay, state.z1);
+    state.fast = sum(none, std::exp(-kernel_.gamma() * x), state.fast);
+    state.soft = sum(none, std::exp(-kernel_.lambda() * x), state.soft);
+    from = end;
+  }
+}
+
 // The state at instant `at` of a step that set in at `from`.
 OnsetRows::State OnsetRows::left(std::size_t from, std::size_t at) const {
-  const double x = way(from, at), decay = std::exp(-design_.beta * x);
   const State& now = state_[at - first_];
   State before = state_[from - first_];
   const core::RowMatrix impulse = jump(from);
   before.z1.g1 -= impulse;
   before.fast.g1 -= impulse;
+  if (!motion_->cuts.empty()) {
+    before.soft.g1 -= impulse;
+    pass(before, from, at);
+    return {sum(now.z1, -1.0, before.z1), sum(now.z2, -1.0, before.z2), sum(now.fast, -1.0, before.fast),
+            sum(now.soft, -1.0, before.soft)};
+  }
+  const double x = way(from, at), decay = std::exp(-design_.beta * x);
   return {sum(now.z1, -decay, before.z1), sum(sum(now.z2, -decay, before.z2), -decay * x, before.z1),
-          sum(now.fast, -std::exp(-kernel_.gamma() * x), before.fast)};
+          sum(now.fast, -std::exp(-kernel_.gamma() * x), before.fast), now.soft};
 }
 
 void OnsetRows::between(std::size_t a, std::size_t b) {
   check::that(a >= first_ && a < b && b + 1 < end_, "onset", "instants of the motion");
   s_ = b + 1;
   errors_.begin(s_);
-  bound_ = {FaultSignals::none(*model_), FaultSignals::none(*model_), FaultSignals::none(*model_)};
+  const FaultSignals none = FaultSignals::none(*model_);
+  bound_ = {none, none, none, none};
   const std::size_t from = a > first_ ? a - 1 : a;
   const core::RowMatrix counted = jump(s_);
   for (std::size_t k = from; k <= s_; ++k) {
     State state = left(k, s_);
     state.z1.g1 -= counted;
     state.fast.g1 -= counted;
+    state.soft.g1 -= counted;
+    raise(bound_.soft, state.soft);
     raise(bound_.z1, state.z1);
     raise(bound_.z2, state.z2);
     raise(bound_.fast, state.fast);
@@ -148,11 +184,12 @@ void OnsetRows::between(std::size_t a, std::size_t b) {
       const double by = std::abs(term.scale) * error[static_cast<Eigen::Index>(term.coordinate)];
       bound_.z1.g1(i, j) += by;
       bound_.fast.g1(i, j) += by;
+      bound_.soft.g1(i, j) += by;
     }
   }
   if (drifts(fault_)) {
     uncertain_ = std::min(1.0, (motion_->instant[s_] - motion_->instant[from]) / fault_.profile.rise);
-    for (FaultSignals* part : {&bound_.z1, &bound_.z2, &bound_.fast}) {
+    for (FaultSignals* part : {&bound_.z1, &bound_.z2, &bound_.fast, &bound_.soft}) {
       part->g1 *= uncertain_;
       part->g2 *= uncertain_;
       part->c *= uncertain_;
@@ -226,7 +263,9 @@ std::array<double, 3> OnsetRows::left_bounds(std::size_t i, double kappa, const 
     return {size(bound_.z1), 0.0, 0.0};
   }
   const double slow = kernel_.slow(), quick = slow * kernel_.apart();
-  return {slow * size(bound_.z2) + quick * size(bound_.z1), slow * size(bound_.z1), quick * size(bound_.fast)};
+  const double cut = motion_->cuts.empty() ? 0.0 : size(bound_.soft);  // of a cut behind s_
+  const double z1 = size(bound_.z1) + cut;
+  return {slow * size(bound_.z2) + quick * z1, slow * z1, quick * (size(bound_.fast) + cut)};
 }
 
 std::array<double, 3> OnsetRows::left_bounds(double effort) const {

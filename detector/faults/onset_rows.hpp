@@ -74,10 +74,11 @@ class OnsetRows {
 
  private:
   struct State {
-    FaultSignals z1, z2, fast;  // KernelState, entry by entry
+    FaultSignals z1, z2, fast, soft;  // KernelBank, entry by entry
   };
   [[nodiscard]] core::RowMatrix jump(std::size_t k) const;
   [[nodiscard]] State left(std::size_t from, std::size_t at) const;
+  void pass(State& state, std::size_t from, std::size_t to) const;
   [[nodiscard]] FaultSignals filtered(std::size_t k) const;
   [[nodiscard]] double way(std::size_t from, std::size_t to) const { return way_[to - first_] - way_[from - first_]; }
   void take(const FaultType& fault);

@@ -42,6 +42,7 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
   motion.errors = filter.errors();
   motion.measured = true;
   std::size_t seen = 0;
+  bool whole = true;
   core::for_each_sample(log, filter.measurement().columns(), [&](const core::LogSample& sample) {
     if (sample.starts) {
       filter.restart();
@@ -66,6 +67,10 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
     motion.t.push_back(sample.t);
     motion.instant.push_back(filter.instant());
     motion.step.push_back(length);
+    const bool first = filter.instants() == 1;
+    motion.weights.push_back(first ? 1.0 : filter.share());
+    motion.cuts.push_back(!first && filter.cut());
+    whole = whole && motion.weights.back() == 1.0;
     motion.heading.push_back(filter.heading());
     motion.settled.push_back(settled && !filter.rests_on_standstill());
     append(speed, filter.speed());
@@ -76,6 +81,10 @@ ReferenceMotion walk(LogSource& log, RegressorFilter filter) {
     append(y, filter.row().y);
     append(dy, filter.row().dy);
   });
+  if (whole) {
+    motion.weights.clear();
+    motion.cuts.clear();
+  }
   const auto k = static_cast<Eigen::Index>(motion.t.size());
   motion.speed = Eigen::Map<const Eigen::MatrixXd>(speed.data(), coordinates, k);
   motion.joint_speed = Eigen::Map<const Eigen::MatrixXd>(joint_speed.data(), joints, k);

@@ -23,6 +23,8 @@ struct ReferenceMotion {
   std::vector<double> t;                ///< K times of these rows, s
   std::vector<double> instant;          ///< K times of the instants, s
   std::vector<double> step;             ///< K lengths of the steps that end there, s (speeds: 0 for a segment's first)
+  std::vector<double> weights;          ///< K: RegressorFilter::share() there; empty: 1, no step is unknown
+  std::vector<bool> cuts;               ///< K: RegressorFilter::cut() there; empty: none
   MotionKind kind = MotionKind::speed;  ///< what the motion was read from
   double nominal_step = 0.0;            ///< of the measurement, s
   Eigen::MatrixXd speed;                ///< coordinates × K, v
@@ -57,6 +59,10 @@ struct ReferenceMotion {
     const double half = 0.5 * step[k + 1];
     return {kind == MotionKind::speed ? half : 0.5 * step[k], half};
   }
+  /// With what share of its weight rows hold what happens between instants k and k + 1.
+  [[nodiscard]] double held(std::size_t k) const { return k + 1 < weights.size() ? weights[k + 1] : 1.0; }
+  /// Whether the weights of all that was before instant k end there.
+  [[nodiscard]] bool cut_at(std::size_t k) const { return k + 1 < cuts.size() && cuts[k + 1]; }
 };
 
 /// The motion of `log` as `filter` reads it, whose error bounds the rows get. Walks the log (three times where efforts

@@ -149,7 +149,7 @@ ScaleDetector::ScaleDetector(const OnlineModel& model, ScaleDetectorOptions opti
   joint_g_ = Eigen::ArrayXXd::Zero(W, joints);
   torque_ = Eigen::VectorXd::Zero(n);
   Y_ = core::RowMatrix::Zero(n, p);
-  turning_ = efforts_ = efforts1_ = spread_ = Eigen::ArrayXd::Zero(W);
+  cut_ = turning_ = efforts_ = efforts1_ = spread_ = Eigen::ArrayXd::Zero(W);
   signals_ = Eigen::ArrayXXd::Zero(W, kParameters + p);
   squares_ = Eigen::ArrayXXd::Zero(W, varied_ ? 2 : 1);
   a0_ = a1_ = g_;
@@ -222,6 +222,19 @@ void ScaleDetector::weigh() {
     }
   }
   multiply_in_order(g_, slope_gain_.transpose(), c_);
+  cut_.setZero();
+  const filter::WeakElement& e = elements_.element();
+  if (!e.known) {
+    // The sum goes on as if it had a weight, and this element is taken away again: with all that the errors of the
+    // motion make of it.
+    const double joints = static_cast<double>(elements_.model().joints.size());
+    const double inverse = elements_.angles() ? 1.0 / e.before + 1.0 / e.step : 1.0;
+    const double by = 2.0 * risk_.errors.motion.bound * std::sqrt(joints) * inverse;
+    for (Eigen::Index w = 0; w < cut_.size(); ++w) {
+      cut_[w] = by * std::sqrt(dot_in_order(c_.row(w), c_.row(w)));
+    }
+    g_.setZero();
+  }
 }
 
 void ScaleDetector::take() {
@@ -236,7 +249,7 @@ void ScaleDetector::take() {
   multiply_in_order(g_, m.input, joint_g_);
 
   // At worst: what stands beside the sum for certain, in units of K.
-  straight = kRoundings * residual.abs();
+  straight = kRoundings * residual.abs() + cut_;
   for (Eigen::Index q = 0; q < rows.cols(); ++q) {
     straight += (kRoundings * largest_[q]) * rows.col(q).abs();
   }

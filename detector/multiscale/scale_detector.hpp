@@ -150,6 +150,7 @@ class ScaleDetector {
   Eigen::VectorXd torque_;
   core::RowMatrix Y_;
   Eigen::ArrayXXd signals_;  // weights × Columns: of the newest element
+  Eigen::ArrayXd cut_;       // weights: what taking the newest element out of a smooth sum costs, in units of K
   Eigen::ArrayXd turning_, efforts_, efforts1_, spread_;
   Eigen::ArrayXXd squares_, a0_, a1_;
   std::array<double, 4> steps_{};  // the newest last

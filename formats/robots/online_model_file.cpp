@@ -56,7 +56,7 @@ void read_between_samples(const JsonPlace& place, const Model& model, filter::Si
   if (between.value().is_null()) {
     return;
   }
-  errors.between_samples = true;
+  errors.between_samples = errors.bridges = true;
   filter::MotionBound& bound = errors.motion;
   bound.limit = vector_at(between.at("acceleration"));
   bound.largest = vector_at(between.at("largest"));
@@ -84,6 +84,7 @@ void read_between_samples(const JsonPlace& place, const Model& model, filter::Si
 filter::SignalErrors read_errors(const JsonPlace& place, const Model& model) {
   filter::SignalErrors errors = motion_errors_at(place, model);
   errors.output = bounds_at(place.at("output"), model.n());
+  errors.bridges = true;
   return errors;
 }
 

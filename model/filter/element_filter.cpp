@@ -50,6 +50,7 @@ ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors 
                           measurement_.nominal_step);
     back += steps_within(-measurement_.delay.lower, measurement_.nominal_step);
   }
+  longest_ = measurement_.longest_step();
   if (errors_.acceleration.size() == 0) {
     errors_.acceleration = errors_.speed = errors_.speed_sample = Eigen::VectorXd::Zero(coordinates);
   }
@@ -77,6 +78,10 @@ ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors 
         EffortCorrector(measurement_.correction, model_.joints.size(), measurement_.hold, measurement_.nominal_step);
     measurement_.changes = model::EffortChanges::at_samples;
   }
+  const bool odometry = model_.heading_used && measurement_.heading_column.empty();
+  const bool angle = measurement_.motion == MotionKind::angle;
+  bridges_ = errors_.bridges && longest_ > 0.0 && (corrector_.empty() || !(corrector_.memory(0.5) > 0.0)) && (angle || !odometry) &&
+             !(angle && measurement_.effort_unsigned);
   element_.motion = element_.slope = element_.motion_doubt = element_.motion_doubt_before = speed_;
   element_.torque = element_.torque_doubt = output_zero;
   element_.functions.resize(functions_.size());
@@ -149,6 +154,35 @@ void ElementFilter::measure_motion(const Sample& now, const Sample& before) {
   const double error = angles_ && errors_.joint_sample > 0.0 ? measurement_.nominal_step / step.length : 1.0;
   each(step.joint_error.size(), [&](Eigen::Index j) { step.joint_error[j] = error * errors_.joint_sample; });
   each(step.speed.size(), [&](Eigen::Index c) { step.speed_error[c] = error * errors_.speed_sample[c]; });
+}
+
+// Whether rows are lost between the sample of `age` and the one before it.
+bool ElementFilter::lost_before(std::size_t age) const {
+  return longest_ > 0.0 && sample(age).t - sample(age + 1).t > longest_;
+}
+
+// Whether the samples tell the effort in the step whose motion ends with the sample of `age`.
+bool ElementFilter::effort_is_known(std::size_t age) const {
+  if (!(longest_ > 0.0)) {
+    return true;
+  }
+  const bool mean = measurement_.motion == MotionKind::mean_speed;
+  const bool held = measurement_.hold == Hold::zero_order && measurement_.changes == model::EffortChanges::at_samples;
+  if (lost_before(age) || (mean && !held && lost_before(age - 1))) {
+    return false;
+  }
+  if (ranged_) {
+    const double shift = mean ? 0.5 * measurement_.nominal_step : 0.0;
+    const double from = sample(age + 1).t + shift + measurement_.delay.lower,
+                 to = sample(age).t + shift + measurement_.delay.upper;
+    const std::size_t kept = std::min(samples_, ring_.size());
+    for (std::size_t k = 0; k + 1 < kept; ++k) {
+      if (sample(k).t > from && sample(k + 1).t < to && lost_before(k)) {
+        return false;
+      }
+    }
+  }
+  return true;
 }
 
 // All values that may act between `begin` and `end` where logged efforts are late by anything in the declared range.
@@ -257,8 +291,10 @@ bool ElementFilter::describe(std::size_t age) {
   newest_step_ = 1 - newest_step_;
   length_before_ = length_;
   const bool mean = measurement_.motion == MotionKind::mean_speed;
-  length_ = mean && measurement_.nominal_step > 0.0 ? measurement_.nominal_step : now.t - before.t;
+  const bool interval = mean && measurement_.nominal_step > 0.0 && !lost_before(age);
+  length_ = interval ? measurement_.nominal_step : now.t - before.t;
   present().length = length_;
+  present().known = effort_is_known(age);
   measure_motion(now, before);
   if (measurement_.heading_column.empty()) {
     const bool first = instants_ == (angles_ ? 0U : 1U);
@@ -271,6 +307,10 @@ bool ElementFilter::describe(std::size_t age) {
     present().heading = 0.5 * (before.heading + now.heading);
   }
   present().heading_error = errors_.heading;
+  if (!present().known) {
+    present().acceleration.setZero();
+    return true;
+  }
   return measure_effort(age) && enclosure_.enclose(model_, present());
 }
 
@@ -294,7 +334,7 @@ void ElementFilter::curve_effort(double a, double b, const Eigen::VectorXd& firs
 
 void ElementFilter::begin() {
   began_ = true;
-  at_rest_ = speed_.isZero(0.0) && (corrector_.empty() || present_effort().falling.isZero(0.0));
+  at_rest_ = present().known && speed_.isZero(0.0) && (corrector_.empty() || present_effort().falling.isZero(0.0));
   first_length_ = length_;
   element_.number = 0;
 }
@@ -317,6 +357,8 @@ void ElementFilter::make_hat() {
       curve_doubt_ *= h;
     }
   }
+  element_.known = true;
+  element_.run_begins = element_.run_ends = false;
   element_.t = t_ - h;
   element_.length = 0.5 * (before + h);
   element_.before = before;
@@ -358,6 +400,8 @@ void ElementFilter::make_step() {
   for (Eigen::Index i = 0; i < effort_change_.size(); ++i) {
     effort_change_[i] = exact && !ranged_ ? 0.0 : 2.0 * (effort_change_[i] + errors_.motion.effort[i]);
   }
+  element_.known = true;
+  element_.run_begins = element_.run_ends = false;
   element_.t = t_;
   element_.length = element_.before = element_.step = h;
   for (std::size_t c = 0; c < static_cast<std::size_t>(element_.motion.size()); ++c) {
@@ -377,6 +421,37 @@ void ElementFilter::make_step() {
   for (std::size_t k = 0; k < functions_.size(); ++k) {
     element_.functions[k] = {h * present().values[k].value, h * present().values[k].error};
   }
+}
+
+// The same where a step of it is not known.
+void ElementFilter::make_unknown() {
+  const double h = length_;
+  const StepMotion &first = previous(), &last = present();
+  element_.known = false;
+  element_.t = angles_ ? t_ - h : t_;
+  element_.before = angles_ ? length_before_ : h;
+  element_.step = h;
+  element_.length = 0.0;
+  element_.motion.setZero();
+  element_.slope.setZero();
+  element_.torque.setZero();
+  element_.torque_doubt.setZero();
+  element_.motion_doubt.setZero();
+  element_.motion_doubt_before.setZero();
+  for (model::TermValue& function : element_.functions) {
+    function = {};
+  }
+  if (!angles_) {
+    element_.run_begins = instants_ == 2 || first.known;
+    element_.run_ends = false;
+    return;
+  }
+  element_.run_begins = first.known;
+  element_.run_ends = last.known;
+  each(element_.motion.size(), [&](Eigen::Index c) {  // accelerations of steps that are not known are 0
+    element_.motion_doubt[c] = last.acceleration[c] * cube(h) / 12.0;
+    element_.motion_doubt_before[c] = first.acceleration[c] * cube(length_before_) / 12.0;
+  });
 }
 
 // Held, linear, stamps at samples or in the middle of the steps: as measure_effort() and curve_effort() have them.
@@ -444,7 +519,8 @@ bool ElementFilter::take() {
   }
   const Sample& now = sample(age);
   const double h = length_;
-  t_ = measurement_.motion == MotionKind::mean_speed ? now.t + 0.5 * h : now.t;
+  const double half = 0.5 * (lost_before(age) ? measurement_.nominal_step : h);
+  t_ = measurement_.motion == MotionKind::mean_speed ? now.t + half : now.t;
   if (angles_) {
     joint_speed_ = present().joint_speed;
     speed_ = present().speed;
@@ -466,7 +542,9 @@ bool ElementFilter::take() {
       return false;
     }
   }
-  if (angles_) {
+  if (!present().known || (angles_ && !previous().known)) {
+    make_unknown();
+  } else if (angles_) {
     make_hat();
   } else {
     make_step();
@@ -476,8 +554,7 @@ bool ElementFilter::take() {
 }
 
 bool ElementFilter::step(double t, std::span<const double> sample) {
-  const double longest = measurement_.longest_step();
-  if (samples_ > 0 && longest > 0.0 && t - ring_[newest_].t > longest) {
+  if (!bridges_ && samples_ > 0 && longest_ > 0.0 && t - ring_[newest_].t > longest_) {
     restart();
     after_loss_ = true;
   }

@@ -25,8 +25,14 @@ namespace wheelwright::filter {
 ///
 /// For speeds ω is 1 in a step and 0 outside. Any weight that is linear between samples (constant in each step) is a
 /// sum of these, so that every regression on this equation is made of elements: Σ g_k (element k).
+///
+/// Where rows are lost nothing is known of the effort in a step. A sum may have any weights: those of the elements that
+/// hold such a step are 0, and the equation holds as before. What it costs is that weights fall to 0 and rise again at
+/// its edges, where the motion's errors count for more.
 struct WeakElement {
   std::size_t number = 0;        ///< from 1 on in a segment
+  bool known = true;             ///< false: it holds a step of unknown effort, its weight is 0; what follows is then 0,
+                                 ///< but for times, motion_doubt and motion_doubt_before of steps that are known
   double t = 0.0;                ///< s, its sample (angles), the end of its step (speeds)
   double length = 0.0;           ///< s, ∫ ω
   double before = 0.0;           ///< s, from the sample before to its sample (angles); its step (speeds)
@@ -39,6 +45,8 @@ struct WeakElement {
   /// in the step after the sample, by which the *slope* of a sum's weights is to be multiplied.
   Eigen::VectorXd motion_doubt;
   Eigen::VectorXd motion_doubt_before;      ///< angles: the same of the step before the sample
+  bool run_begins = false;                  ///< not known, and the first of a run: the step before is known
+  bool run_ends = false;                    ///< not known, and the last of a run: the step behind is known
   std::vector<model::TermValue> functions;  ///< ∫ ω f of each function term, in their order
 };
 
@@ -53,7 +61,8 @@ class ElementFilter {
   /// Forgets all samples: the next one starts a segment.
   void restart();
 
-  /// Takes the sample at time `t` (RegressorFilter::step). Returns whether element() is a new one.
+  /// Takes the sample at time `t` (RegressorFilter::step). Returns whether element() is a new one, which may be one
+  /// that is not known (WeakElement::known).
   bool step(double t, std::span<const double> sample);
 
   /// The newest.
@@ -84,6 +93,10 @@ class ElementFilter {
   [[nodiscard]] bool at_rest() const { return at_rest_; }
   /// True if the segment begins after lost rows.
   [[nodiscard]] bool after_loss() const { return after_loss_; }
+  /// True if a segment goes on where rows are lost, as SignalErrors::bridges asks for. Where it does not, the filter
+  /// restarts there: efforts are corrected by what has a memory, or what the model looks at (a heading by odometry, the
+  /// sign of an effort that comes without one) would have to be known in between.
+  [[nodiscard]] bool bridges() const { return bridges_; }
   /// Length of the segment's first step, s.
   [[nodiscard]] double first_length() const { return first_length_; }
   /// Efforts' correction.
@@ -127,11 +140,14 @@ class ElementFilter {
   bool describe(std::size_t age);
   void measure_motion(const Sample& now, const Sample& before);
   bool measure_effort(std::size_t age);
+  [[nodiscard]] bool lost_before(std::size_t age) const;
+  [[nodiscard]] bool effort_is_known(std::size_t age) const;
   void effort_of_range(double begin, double end);
   [[nodiscard]] bool effort_is_covered(double end) const;
   void begin();
   void make_hat();
   void make_step();
+  void make_unknown();
   void curve_effort(double a, double b, const Eigen::VectorXd& first, const Eigen::VectorXd& middle,
                     const Eigen::VectorXd& last, double corrected, double covered);
 
@@ -143,6 +159,8 @@ class ElementFilter {
   bool angles_ = false;    // steps between angles, measured or those behind mean speeds
   std::size_t ahead_ = 0;  // samples that efforts are known ahead of the motion that is filtered
   bool ranged_ = false;    // efforts are late by an unknown time
+  double longest_ = 0.0;   // s: in a longer step rows are lost; 0: not known
+  bool bridges_ = false;
   std::vector<std::size_t> functions_;
 
   std::vector<Sample> ring_;

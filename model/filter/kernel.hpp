@@ -144,7 +144,7 @@ class KernelBank {
  public:
   KernelBank() = default;
   /// `signals` of them, in a segment that has not begun.
-  explicit KernelBank(std::size_t signals) : rows_((signals + kLane - 1) / kLane * kLane), numbers_(5 * rows_, 0.0) {}
+  explicit KernelBank(std::size_t signals) : rows_((signals + kLane - 1) / kLane * kLane), numbers_(6 * rows_, 0.0) {}
 
   /// `signals` each; what was written to in() stays there.
   [[nodiscard]] double* in() { return numbers_.data(); }
@@ -156,6 +156,18 @@ class KernelBank {
   [[nodiscard]] const double* z1() const { return numbers_.data() + 2 * rows_; }
   [[nodiscard]] const double* z2() const { return numbers_.data() + 3 * rows_; }
   [[nodiscard]] const double* fast() const { return numbers_.data() + 4 * rows_; }
+  /// Σ q_k e^{−λx_k} since the last cut(), of a FilterKernel that is soft.
+  [[nodiscard]] double* soft() { return numbers_.data() + 5 * rows_; }
+  [[nodiscard]] const double* soft() const { return numbers_.data() + 5 * rows_; }
+  /// Lets the weight of what went into the first `signals` since the last cut end here, now and for ever: what it was
+  /// to be, w(t − t_k), becomes w(t − t_k) − e^{−λx_k} w(t − now), x_k = now − t_k.
+  void cut(std::size_t signals) {
+    for (std::size_t k = 0; k < signals; ++k) {
+      z1()[k] -= soft()[k];
+      fast()[k] -= soft()[k];
+      soft()[k] = 0.0;
+    }
+  }
 
   /// Forgets everything, in() too.
   void clear() { std::fill(numbers_.begin(), numbers_.end(), 0.0); }
@@ -176,6 +188,8 @@ class KernelBank {
 /// neither the total variation of f₂ nor that of its slope.
 class FilterKernel {
  public:
+  static constexpr double kSoft = 4.0;
+
   FilterKernel() = default;
   /// `nominal_step` (s) may be 0: then nothing is smoothed.
   FilterKernel(const FilterDesign& design, MotionKind motion, double nominal_step)
@@ -207,12 +221,21 @@ class FilterKernel {
   [[nodiscard]] double slow() const { return slow_; }
   [[nodiscard]] double apart() const { return smooth_ ? 1.0 / (gamma_ - beta_) : 0.0; }
 
+  /// Keeps KernelBank::soft() of what goes in: λ is kSoft β. To be called before prepare().
+  void soften() { lambda_ = smooth_ ? kSoft * beta_ : 0.0; }
+  /// λ, 1/s; 0 where nothing is soft. A cut costs about 2λ of the weight there in the slope of the weights, and the
+  /// signals of 1/λ.
+  [[nodiscard]] double lambda() const { return lambda_; }
+  /// e^{−λh} of the step that was prepared.
+  [[nodiscard]] double soft_decay() const { return soft_; }
+
   /// The next steps have the length `h` (s).
   void prepare(double h) {
     if (h != step_) {
       step_ = h;
       weights_ = StepWeights(beta_, h);
       fast_ = smooth_ ? std::exp(-gamma_ * h) : 0.0;
+      soft_ = lambda_ > 0.0 ? std::exp(-lambda_ * h) : 0.0;
     }
   }
 
@@ -241,6 +264,10 @@ class FilterKernel {
         z2 = decay * (z2 + step * sum);
         z1 = decay * sum;
         rest = fast * (rest + in);
+        if (lambda_ > 0.0) {
+          Eigen::Map<Lane> soft(bank.soft() + first);
+          soft = soft_ * (soft + in);
+        }
       } else {
         z2 = decay * (z2 + step * z1) + weights_.increment2() * in;
         z1 = decay * z1 + weights_.increment1() * in;
@@ -267,6 +294,7 @@ class FilterKernel {
   bool nodes_ = false;
   bool smooth_ = false;
   double gamma_ = 0.0, slow_ = 1.0, quick_ = 0.0;
+  double lambda_ = 0.0, soft_ = 0.0;
   double step_ = -1.0, fast_ = 0.0;
   StepWeights weights_;
 };

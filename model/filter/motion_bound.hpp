@@ -33,6 +33,7 @@ struct MotionBound {
 /// One step between two samples, as far as its samples tell.
 struct StepMotion {
   double length = 0.0;           ///< s
+  bool known = true;             ///< false: nothing is known of the effort in it, the rest is not to be looked at
   Eigen::VectorXd speed;         ///< per coordinate, mean over the step
   Eigen::VectorXd speed_error;   ///< bound on its error, what the samples are wrong by
   Eigen::VectorXd joint_speed;   ///< per joint

@@ -148,7 +148,7 @@ SignalErrors propagate(const Model& model, const FilterDesign& design, const Mea
                       ? (sensors.effort * across(input, norms.effort, likely.effort)).eval()
                       : (sensors.effort * norms.effort * input.cwiseAbs().rowwise().sum()).eval();
   errors.heading = sensors.heading;
-  errors.between_samples = true;
+  errors.between_samples = errors.bridges = true;
   errors.motion.effort = sensors.effort * input.cwiseAbs().rowwise().sum();
   errors.joint_sample = sensors.motion;
   if (measurement.motion != MotionKind::speed && sensors.motion > 0.0) {

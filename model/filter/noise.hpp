@@ -50,6 +50,8 @@ struct SignalErrors {
   double heading = 0.0;          ///< rad
   bool between_samples = false;  ///< dY and dy hold what motion and efforts may do between two samples as well
   MotionBound motion{};          ///< how fast the motion can change between two samples
+  bool bridges = false;  ///< where rows are lost a segment goes on (ElementFilter::bridges). Not for a fit, which takes
+                         ///< the noise of all rows for alike
 };
 
 /// Norms of the kernels that turn a motion or effort error of size 1 into the error of a filtered signal.

@@ -57,7 +57,8 @@ void PredictableRegressor::take(const ElementFilter& elements) {
     --count_;
   }
   value_ = z_[kOrder - 1] + (lead_ * beta_) * (z_[kOrder - 2] - z_[kOrder - 1]);
-  if (count_ == ring_.size()) {  // steps are shorter than they were said to be: this one is not looked at
+  // Steps are shorter than they were said to be, or nothing is known of it: this one is not looked at.
+  if (count_ == ring_.size() || !e.known) {
     return;
   }
   Waiting& next = ring_[(oldest_ + count_) % ring_.size()];

@@ -8,6 +8,20 @@
 #include "core/check.hpp"
 
 namespace wheelwright::filter {
+namespace {
+
+// L2 norms: of the errors of the samples at an edge, per unit of the edge, over that of a whole row (statistical_norms()
+// for short steps). An edge within a step is (1, −1) times half of it, a soft one is less.
+double roughness_per_edge(const FilterDesign& design, const Measurement& measurement) {
+  constexpr double kOfEdge = 0.71, kNewest = 0.68;
+  const double gain = std::pow(design.alpha, design.order), step = measurement.nominal_step;
+  if (measurement.motion != MotionKind::speed) {
+    return kOfEdge / (kNewest * gain);
+  }
+  return kOfEdge / (design.order == 1 || !(step > 0.0) ? gain : gain * std::sqrt(step / (4.0 * design.beta)));
+}
+
+}  // namespace
 
 RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement measurement, SignalErrors errors)
     : elements_(std::move(model), std::move(measurement), std::move(errors)), design_(design) {
@@ -25,7 +39,15 @@ RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement m
   torque_doubt_ = functions_ + functions;
   function_doubt_ = torque_doubt_ + m.n();
   motion_doubt_ = function_doubt_ + functions;
-  bank_ = KernelBank(elements_.angles() ? motion_doubt_ : motion_doubt_ + coordinates);
+  edge_ = elements_.angles() ? motion_doubt_ : motion_doubt_ + coordinates;
+  whole_ = edge_ + 1;
+  edge_doubt_ = whole_ + 1;
+  bank_ = KernelBank(elements_.angles() ? edge_doubt_ + coordinates : whole_);
+  doubt_before_.assign(coordinates, 0.0);
+  if (elements_.bridges()) {
+    kernel_.soften();
+  }
+  per_edge_ = roughness_per_edge(design_, this->measurement());
   static_gain_ = design_.static_gain();
   error_.resize(2 * coordinates);
   slope_doubt_.resize(coordinates);
@@ -48,6 +70,10 @@ RegressorFilter::RegressorFilter(Model model, FilterDesign design, Measurement m
 void RegressorFilter::begin() {
   bank_.clear();
   std::fill(slope_doubt_.begin(), slope_doubt_.end(), SlopeMajorant{});
+  turn_ = {};
+  left_ = rate_ = cross_ = 0.0;
+  std::fill(doubt_before_.begin(), doubt_before_.end(), 0.0);
+  slope_before_ = (1.0 - std::exp(-kernel_.lambda() * elements_.first_length())) / elements_.first_length();
   const double length = elements_.first_length();
   for (std::size_t c = 0; c < first_doubt_.size(); ++c) {
     first_doubt_[c] = elements_.last_step().acceleration[static_cast<Eigen::Index>(c)] * length * length / 12.0;
@@ -61,7 +87,13 @@ void RegressorFilter::follow() {
   if (e.number % kFade == 0) {
     bank_.fade();
     std::ranges::for_each(slope_doubt_, &SlopeMajorant::fade);
+    turn_.fade();
+    left_ = faded(left_);
+    rate_ = faded(rate_);
+    cross_ = faded(cross_);
+    std::ranges::transform(doubt_before_, doubt_before_.begin(), &faded);
   }
+  share_ = e.known ? 1.0 : 0.0;
   for (std::size_t c = 0; c < coordinates; ++c) {
     const auto i = static_cast<Eigen::Index>(c);
     in[c] = e.motion[i];
@@ -82,7 +114,60 @@ void RegressorFilter::follow() {
   }
   in[area_] = e.length;
   in[start_] = elements_.angles() && e.number == 1 ? 1.0 : 0.0;
+  if (!elements_.angles()) {
+    in[edge_] = e.run_begins ? 2.0 : 0.0;
+  } else if (elements_.bridges()) {
+    cut_out(e);
+  }
   kernel_.take(bank_);
+}
+
+// Weights of a row end before a run of elements that are not known and begin after it. Ended at once, the errors of the
+// samples there would count with 2/h; so what was the weight w becomes w(t − t_k) − e^{−λx} w(t − t_0) before the run's
+// first node t_0, x = t_0 − t_k (KernelBank::cut), and w(t − t_k)(1 − e^{−λx}) behind its last. With these, u = w − w_0
+// ε and ρ = 1 − ε', slopes s and r over a step: the slope of ρu changes at a node by ρ (change of s_u) + u (change of
+// r) + what both slopes make of each other in the steps beside it, h r s_u. Summed up, in absolute values,
+//
+//     |change of s_w|                                 no more than of the whole kernel, but for its slope at the run
+//     2 w_0 (slope of ε at t_0 + Σ h r |slope of ε|)   as 0 <= u <= w, and ε is convex
+//     Σ w |change of r| + 2 Σ h r |s_w|
+void RegressorFilter::cut_out(const WeakElement& e) {
+  double* const in = bank_.in();
+  double edge = 0.0, whole = 0.0, turn = 0.0;
+  const double decay = kernel_.soft_decay(), gone = 1.0 - decay, slope = gone / e.step;
+  const bool goes_on = e.known || e.run_ends;
+  if (e.run_begins) {
+    edge = 2.0 * (slope_before_ + cross_);
+    whole = turn = 1.0;
+    bank_.cut(edge_);
+  }
+  double left = 1.0;
+  if (e.known) {
+    left = decay_before_ * left_;
+    turn += 2.0 * (left_ - left);
+    whole += left_ - left;
+  }
+  const double rate = goes_on ? left * slope : 0.0;
+  if (goes_on) {
+    edge += std::abs(rate - rate_);
+  }
+  for (std::size_t c = 0; c < doubt_before_.size(); ++c) {
+    const double doubt = e.motion_doubt[static_cast<Eigen::Index>(c)];
+    in[edge_doubt_ + c] = (e.run_begins ? doubt_before_[c] : 0.0) + rate * doubt;
+    doubt_before_[c] = goes_on ? decay * doubt_before_[c] + slope * doubt : 0.0;
+  }
+  cross_ = goes_on ? decay * cross_ + left * gone * slope : 0.0;
+  in[edge_] = edge;
+  in[whole_] = whole;
+  turn_.advance(kernel_.decay(), design_.beta * e.step, turn);
+  if (e.known && left > 0.0) {
+    share_ = 1.0 - left;
+    std::transform(in, in + edge_, in, [&](double x) { return share_ * x; });
+  }
+  left_ = left;
+  rate_ = rate;
+  decay_before_ = decay;
+  slope_before_ = slope;
 }
 
 bool RegressorFilter::step(double t, std::span<const double> sample) {
@@ -122,15 +207,20 @@ void RegressorFilter::write_row() {
   const double start = angles ? out[start_] : 0.0;
   const double first =
       start > 0.0 && errors.joint_sample > 0.0 ? start * measurement().nominal_step / elements_.first_length() : 0.0;
+  // What is cut out, in units of the error of a sample of the speed.
+  const double half = 0.5 * measurement().nominal_step, slope = kernel_.gain() * kernel_.majorant_gain();
+  const double edge = angles ? half * (out[edge_] + slope * turn_.value()) : out[edge_];
+  const double whole = angles ? half * out[whole_] : 0.0;
   for (std::size_t c = 0; c < coordinates; ++c) {
     const auto i = static_cast<Eigen::Index>(c);
-    double error = errors.speed[i];
+    double error = errors.speed[i] + whole * errors.speed_sample[i];
     if (bounded) {
-      error += angles ? kernel_.gain() * kernel_.majorant_gain() * slope_doubt_[c].value() + start * first_doubt_[c]
+      error += angles ? slope * slope_doubt_[c].value() + start * first_doubt_[c] +
+                            out[edge_doubt_ + c]
                       : out[motion_doubt_ + c];
     }
     error_[c] = error;
-    error_[coordinates + c] = errors.acceleration[i] + first * errors.speed_sample[i];
+    error_[coordinates + c] = errors.acceleration[i] + (first + edge) * errors.speed_sample[i];
   }
   double *const Y = row_.Y.data(), *const dY = row_.dY.data();
   for (const auto* entries : {&entries_, &function_entries_}) {
@@ -153,7 +243,9 @@ void RegressorFilter::write_row() {
     }
   }
   const bool corrected = !elements_.corrector().empty();  // its doubt is no matter of what happens between samples
-  const double area = bounded ? std::max(1.0, out[area_] / static_gain_) : 1.0;
+  // Where the motion's errors are not known the output's bound stands for them.
+  const double rougher = errors.joint_sample > 0.0 ? 1.0 : 1.0 + rough();
+  const double area = (bounded ? std::max(1.0, out[area_] / static_gain_) : 1.0) * rougher;
   for (Eigen::Index i = 0; i < row_.y.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     row_.y[i] = out[torque_ + k];

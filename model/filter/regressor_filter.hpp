@@ -65,10 +65,11 @@ class RegressorFilter {
 
   /// Takes the sample at time `t` (s): motion of each joint, effort of each joint, heading where
   /// Measurement::heading_column names one (the order of Measurement::columns()). `t` must exceed that of the sample
-  /// before. A step that is longer than Measurement::longest_step restarts the filter: nothing is known of the effort
-  /// in it. Returns whether row() now holds an instant of the regression: not for the first samples of a segment, nor
-  /// before the filter has settled (FilterDesign::settle; after lost rows, before the segment's beginning weighs less
-  /// than the noise of all later samples).
+  /// before. Of a step that is longer than Measurement::longest_step the effort is not known: elements that hold it are
+  /// left out of the row (WeakElement::known; dY and dy say what that costs), or the filter restarts
+  /// (ElementFilter::bridges). Returns whether row() now holds an instant of the regression: not for the first samples
+  /// of a segment, nor before the filter has settled (FilterDesign::settle; after a restart for lost rows, before the
+  /// segment's beginning weighs less than the noise of all later samples).
   bool step(double t, std::span<const double> sample);
 
   /// The instant at the last sample.
@@ -102,10 +103,25 @@ class RegressorFilter {
   }
   /// Length of the last step, s.
   [[nodiscard]] double step_length() const { return elements_.step_length(); }
+  /// With what share of its weight the newest element went into row(): 0 where it is not known, less than 1 for about
+  /// 1/(4β) after that (angles).
+  [[nodiscard]] double share() const { return share_; }
+  /// True if the weights of all elements before the newest were made to end there (KernelBank::cut).
+  [[nodiscard]] bool cut() const { return elements_.angles() && elements_.element().run_begins; }
+  /// What cutting out steps of unknown effort adds at most to the noise of filtered accelerations, in units of what
+  /// noise that is independent from sample to sample makes of them anyway; 0 where no rows were lost.
+  [[nodiscard]] double rough() const { return bank_.out()[edge_] * per_edge_; }
+  /// ElementFilter::bridges().
+  [[nodiscard]] bool bridges() const { return elements_.bridges(); }
+  /// rough() per filtered edge.
+  [[nodiscard]] double per_edge() const { return per_edge_; }
+  /// λ of FilterKernel::soften(), 1/s; 0 where nothing is cut.
+  [[nodiscard]] double softness() const { return kernel_.lambda(); }
 
  private:
   void begin();
   void follow();
+  void cut_out(const WeakElement& element);
   [[nodiscard]] bool settled() const;
   void write_row();
 
@@ -125,6 +141,15 @@ class RegressorFilter {
   KernelBank bank_;
   std::size_t torque_ = 0, area_ = 0, start_ = 0, functions_ = 0;
   std::size_t torque_doubt_ = 0, function_doubt_ = 0, motion_doubt_ = 0;
+  // Beside steps of unknown effort, angles: what the weights' slope varies by more, the weights themselves, and what
+  // motion_doubt_ gets; the slope of the kernel there. Speeds: what the weights vary by more.
+  std::size_t edge_ = 0, whole_ = 0, edge_doubt_ = 0;
+  SlopeMajorant turn_;
+  double per_edge_ = 0.0;                         // of rough()
+  double share_ = 1.0;                            // of the newest element
+  double left_ = 0.0, rate_ = 0.0, cross_ = 0.0;  // 1 − share_; slope of the share, and that met by the kernel's own
+  double decay_before_ = 0.0, slope_before_ = 0.0;
+  std::vector<double> doubt_before_;
   std::vector<Entry> entries_, function_entries_;
   std::vector<double> error_;               // of speeds and slopes
   std::vector<SlopeMajorant> slope_doubt_;  // angles: what motion_doubt_ is for speeds, by the slope of the kernel

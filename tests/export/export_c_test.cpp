@@ -51,6 +51,7 @@ struct Case {
   double nominal = 0.01;  // s
   double jitter = 0.0;    // share of the step
   bool lost = false;      // single rows are missing, and steps of 1.6 steps
+  bool bridges = true;    // whether segments go on there
   double gap = 0.3;       // s
   bool storms = false;    // some samples are no numbers, alone and in spells
   Interval delay{0.0, 0.0};
@@ -150,6 +151,7 @@ TorqueDetector detector_of(const Case& c) {
   }
   const Polytope set = set_of(c);
   errors.between_samples = c.between != Between::nothing;
+  errors.bridges = c.bridges;
   if (c.between == Between::mobility || c.between == Between::both) {
     const Eigen::VectorXd effort = errors.motion.effort;
     errors.motion = filter::motion_bound(c.model, set.hull().sides);
@@ -579,6 +581,7 @@ TEST_F(SlowExportC, EveryCombinationHasTheSameBits) {
             c.heading = model.heading_used && k % 3 == 1;
             c.jitter = kind.motion == MotionKind::mean_speed ? 0.0 : 0.3 * double(k % 2);
             c.lost = k % 11 < 6;
+            c.bridges = k % 17 < 12;
             c.options = of_set(kBox);
             if (k % 13 == 0) {
               c.options.mu = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(model.n()), 0.02);

@@ -67,19 +67,24 @@ struct Case {
   double dry = 0.0;            // share of the effort
   int order = 2;
   double beta = 20.0;
-  double noise = 1.0;  // share of its bound
+  double noise = 1.0;    // share of its bound
+  double lost = 0.0;     // share of rows that begin a run of lost ones ...
+  int run = 1;           // ... of this length
+  long only_lost = 0;    // this row is lost
 };
 
 std::string words(const Case& c) {
   return "motion " + std::to_string(static_cast<int>(c.motion)) + " commands " +
          std::to_string(static_cast<int>(c.commands)) + " clock " + std::to_string(static_cast<int>(c.clock)) + " h " +
          std::to_string(c.h) + " m/f " + std::to_string(c.time_constant) + " period " + std::to_string(c.period) +
-         " dry " + std::to_string(c.dry) + " order " + std::to_string(c.order);
+         " dry " + std::to_string(c.dry) + " order " + std::to_string(c.order) + " lost " + std::to_string(c.lost) +
+         " in runs of " + std::to_string(c.run);
 }
 
 struct Outcome {
-  long rows = 0, beyond = 0;
-  double worst = 0.0;  // largest error over bound
+  long given = 0, rows = 0, beyond = 0;
+  double worst = 0.0;                 // largest error over bound
+  std::vector<double> times, bounds;  // of the rows
 };
 
 Outcome watch(const Case& c, unsigned seed) {
@@ -93,6 +98,7 @@ Outcome watch(const Case& c, unsigned seed) {
   measurement.motion_columns = {"position"};
   measurement.effort_columns = {"effort"};
   measurement.nominal_step = c.h;
+  measurement.shortest_step = c.lost > 0.0 && c.clock == Clock::jittered ? 0.7 * c.h : 0.0;
   measurement.hold = c.commands == Commands::linear ? Hold::first_order : Hold::zero_order;
   measurement.changes =
       c.commands == Commands::between ? model::EffortChanges::between : model::EffortChanges::at_samples;
@@ -135,8 +141,21 @@ Outcome watch(const Case& c, unsigned seed) {
     plant.run(0.5 * c.h, effort, effort);
     before = plant.x;
   }
+  long taken = 0;
+  int missing = 0;
+  const auto is_lost = [&] {
+    if (missing == 0 && taken > 3 && c.lost > 0.0 && 0.5 + 0.5 * unit(rng) < c.lost) {
+      missing = c.run;
+    }
+    return (missing > 0 && missing-- > 0) || (c.only_lost > 0 && taken == c.only_lost);
+  };
   const auto give = [&](double motion, double acting) {
     const std::array<double, 2> sample{motion, acting + noise(sensors.effort)};
+    ++taken;
+    if (is_lost()) {
+      return;
+    }
+    ++outcome.given;
     if (!filter.step(t, sample)) {
       return;
     }
@@ -146,6 +165,8 @@ Outcome watch(const Case& c, unsigned seed) {
     outcome.beyond += error > bound ? 1 : 0;
     outcome.worst = std::max(outcome.worst, error / bound);
     ++outcome.rows;
+    outcome.times.push_back(t);
+    outcome.bounds.push_back(bound);
   };
   double error_before = 0.0;
   for (int k = 0; k < 3000; ++k) {
@@ -243,6 +264,85 @@ std::vector<Case> cases() {
 }
 
 INSTANTIATE_TEST_SUITE_P(Everywhere, RowBounds, testing::ValuesIn(cases()));
+
+class LostRows : public testing::TestWithParam<Case> {};
+
+// Commands that were to come with rows that are lost were executed all the same.
+TEST_P(LostRows, ArePassedOverAndNoRowIsWrong) {
+  const Case c = GetParam();
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    const Outcome outcome = watch(c, seed);
+    const auto settling = c.motion == MotionKind::speed ? 2L : static_cast<long>(std::ceil(12.0 / (c.beta * c.h))) + 3;
+    EXPECT_GE(outcome.rows, outcome.given - settling) << words(c);
+    EXPECT_EQ(outcome.beyond, 0) << words(c) << ": " << outcome.worst << " times the bound in the worst row of "
+                                 << outcome.rows;
+  }
+}
+
+std::vector<Case> with_lost_rows() {
+  std::vector<Case> all;
+  for (const MotionKind motion : {MotionKind::angle, MotionKind::mean_speed, MotionKind::speed}) {
+    for (const Commands commands : {Commands::at_samples, Commands::between, Commands::linear}) {
+      for (const double rate : {10.0, 50.0, 100.0, 500.0}) {
+        for (const double lost : {0.001, 0.01, 0.03, 0.1}) {
+          const int run = lost < 0.02 ? 1 : rate < 60.0 ? 2 : 4;
+          Case c{.motion = motion,
+                 .commands = commands,
+                 .h = 1.0 / rate,
+                 .period = 20.0 / rate,
+                 .beta = std::min(20.0, 0.5 * rate),
+                 .lost = lost / run,
+                 .run = run};
+          all.push_back(c);
+          if (motion == MotionKind::speed) {
+            c.order = 1;
+            all.push_back(c);
+          } else if (motion == MotionKind::angle) {
+            c.clock = Clock::jittered;
+            all.push_back(c);
+          }
+          c.clock = Clock::even;
+          c.order = 2;
+          if (commands != Commands::linear) {
+            c.dry = 0.3;
+            all.push_back(c);
+          }
+        }
+      }
+    }
+  }
+  return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(Everywhere, LostRows, testing::ValuesIn(with_lost_rows()));
+
+TEST(LostRow, WidensBoundsForAWhile) {
+  for (const MotionKind motion : {MotionKind::angle, MotionKind::mean_speed, MotionKind::speed}) {
+    Case c{.motion = motion};
+    const Outcome whole = watch(c, 1);
+    c.only_lost = 1500;
+    const Outcome lossy = watch(c, 1);
+    ASSERT_EQ(whole.rows, lossy.rows + 1);
+    const double instant = 15.0, forgotten = instant + 40.0 / c.beta;
+    std::size_t before = 0, wider = 0, after = 0;
+    for (std::size_t k = 0, w = 0; k < lossy.times.size(); ++k, ++w) {
+      w += whole.times[w] != lossy.times[k] ? 1 : 0;
+      ASSERT_EQ(whole.times[w], lossy.times[k]);
+      if (lossy.times[k] < instant - 0.02) {
+        ++before;
+        ASSERT_EQ(whole.bounds[w], lossy.bounds[k]) << "what comes later";
+      } else if (lossy.times[k] > forgotten) {
+        ++after;
+        ASSERT_NEAR(lossy.bounds[k] / whole.bounds[w], 1.0, 1e-9) << "what was long ago";
+      } else {
+        wider += lossy.bounds[k] > whole.bounds[w] ? 1 : 0;
+      }
+    }
+    EXPECT_GT(before, 1000u);
+    EXPECT_GT(wider, 20u);
+    EXPECT_GT(after, 1000u);
+  }
+}
 
 }  // namespace
 }  // namespace wheelwright::filter::row_bounds_test

@@ -321,6 +321,32 @@ TEST(LostRows, OneInAHundred) {
   });
 }
 
+// Alone and in bursts, for every sensor, at every rate, with efforts held and linear.
+TEST(LostRows, UpToOneInTen) {
+  constexpr std::array<double, 4> kRates{10.0, 50.0, 100.0, 500.0};
+  constexpr std::array<double, 3> kLost{0.01, 0.03, 0.1};
+  constexpr std::array<Sense, 4> kSenses{Sense::angle, Sense::encoder, Sense::speed, Sense::mean_speed};
+  for (const int burst : {1, 3}) {
+    expect_kept(fmt::format("1 to 10 % of rows lost, {} at once", burst), [&](std::uint64_t seed) {
+      const double rate = kRates[seed % kRates.size()];
+      Case c = ordinary(seed, rate, std::min(5.0, 0.1 * rate));
+      c.sense = kSenses[(seed / 4) % kSenses.size()];
+      c.lost = kLost[(seed / 2) % kLost.size()] / burst;
+      c.burst = burst;
+      c.changes = seed % 3 == 0 ? Changes::linear : Changes::at_samples;
+      if (c.sense == Sense::encoder || c.sense == Sense::mean_speed) {
+        c.counts = 4096.0;
+        c.motion_bound = std::numbers::pi / 4096.0;
+      } else if (c.sense == Sense::speed) {
+        c.speed_source = model::SpeedSource::measured;
+        c.motion_bound = 0.01;
+      }
+      c.learn.motion = c.watch.motion = c.changes == Changes::linear ? Motion::multisine : Motion::random_steps;
+      return c;
+    });
+  }
+}
+
 TEST(LostRows, OneInAThousand) {
   expect_kept("0.1 % of rows lost", [](std::uint64_t seed) {
     Case c = ordinary(seed, 100.0, 5.0);

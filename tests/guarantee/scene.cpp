@@ -164,9 +164,14 @@ LogTable record(const Case& c, const Order& order, Noise noise, std::size_t rows
 
   std::vector<double> kept;
   std::size_t missing = 0;
+  int left = 0;  // of a burst
   for (std::size_t k = 1; k + 1 < all.size(); ++k) {
-    if (missing < kMostLost && kept.size() > 1 && drive_dice.chance(c.lost)) {
+    if (left > 0) {
       ++missing;
+      --left;
+    } else if (missing < kMostLost && kept.size() > 1 && drive_dice.chance(c.lost)) {
+      ++missing;
+      left = c.burst - 1;
     } else {
       kept.push_back(all[k]);
       missing = 0;

@@ -73,7 +73,8 @@ struct Case {
   double rate = 100.0;  ///< rows a second, on average
   Stamps stamps = Stamps::even;
   double jitter = 0.0;
-  double lost = 0.0;  ///< share of rows that are missing
+  double lost = 0.0;  ///< share of rows at which rows go missing ...
+  int burst = 1;      ///< ... so many at once
   Sense sense = Sense::angle;
   double motion_bound = 1e-3;    ///< rad or rad/s; half a count for counting sensors
   std::optional<double> counts;  ///< per turn
