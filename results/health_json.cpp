@@ -45,7 +45,8 @@ doctor::ReaderCounts reader_counts(const logs::LogReport& report) {
           .truncated = report.truncated.count,
           .jumps = report.jumps.count,
           .unwrapped = report.angle_wraps.count,
-          .contradictions = std::move(contradictions)};
+          .contradictions = std::move(contradictions),
+          .time_remedy = report.files.empty() ? std::string() : report.files.front().time_remedy};
 }
 
 doctor::LogHealth examine_first(logs::RecordedLog& log, const std::optional<Robot>& robot, std::size_t most,

@@ -86,6 +86,7 @@ struct ReaderCounts {
   std::size_t jumps = 0;                         ///< segments that begin where a wheel angle jumps as no wheel turns
   std::size_t unwrapped = 0;                     ///< jumps of a wheel angle by a turn that were undone
   std::vector<std::string> contradictions = {};  ///< why the joints are those of no differential drive, in sentences
+  std::string time_remedy = {};  ///< the argument that makes s of the times where they look like another unit
 };
 
 /// The examination.
