@@ -396,10 +396,11 @@ Assumption motion_between_samples(const Commissioning& r) {
   if (!error || r.survey.median_step <= 0.0) {
     return a;
   }
-  double shown = 0.0;
+  double shown = 0.0, noise = 0.0;
   for (std::size_t j = 0; j < r.survey.sharpest_change.size(); ++j) {
-    shown = std::max(
-        shown, r.survey.sharpest_change[j] - acceleration_by_noise(r.survey, j, m.motion, *error, m.shortest_step));
+    const double hidden = acceleration_by_noise(r.survey, j, m.motion, *error, m.shortest_step);
+    shown = std::max(shown, r.survey.sharpest_change[j] - hidden);
+    noise = std::max(noise, hidden);
   }
   // A violation shows once it is beyond what errors may hide of it.
   a.verdict = shown > limit->second   ? AssumptionVerdict::fails

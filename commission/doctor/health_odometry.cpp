@@ -566,7 +566,7 @@ void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
 namespace {
 
 constexpr double kTurnedHeading = 0.03;  // rad, from which on an offset is said and taken off
-constexpr double kOffsetErrors = 5.0;    // standard errors
+constexpr double kTurnedErrors = 5.0;    // standard errors
 
 }  // namespace
 
@@ -579,7 +579,7 @@ std::optional<double> check_heading(const HealthView& view, std::vector<LogFindi
   const double scale = heading_scale(windows);
   const auto found = driving_direction(windows, scale);
   if (!found || std::abs(scale) != 1.0 || alignment(windows, scale).quality < kAligned ||
-      std::abs(found->offset) < kTurnedHeading + kOffsetErrors * found->error) {
+      std::abs(found->offset) < kTurnedHeading + kTurnedErrors * found->error) {
     return std::nullopt;
   }
   LogFinding f = about_units(
@@ -591,7 +591,7 @@ std::optional<double> check_heading(const HealthView& view, std::vector<LogFindi
       fmt::format("It is taken off on reading; `heading_offset: {:.4f}` in the robot file settles it.", found->offset),
       {"theta"}, found->offset);
   f.unit = "rad";
-  const double margin = kOffsetErrors * found->error;
+  const double margin = kTurnedErrors * found->error;
   f.taken = Interval{found->offset - margin, found->offset + margin};
   out.push_back(f);
   return found->offset;
