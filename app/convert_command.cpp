@@ -19,6 +19,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::filesystem::path> paths;
+  std::filesystem::path robot;
   logs::McapCompression compression = logs::McapCompression::zstd;
   CommonOptions common;
 };
@@ -31,6 +32,7 @@ constexpr const char* kHelp =
 constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright convert drive.mcap drive.csv\n"
+    "  wheelwright convert vesc.csv drive.csv --robot robot.yaml\n"
     "  wheelwright convert my_bag/ drive.h5 --map omega_r=/joints.velocity[right_wheel]\n"
     "  wheelwright convert monday.csv tuesday.csv.gz both.mcap --compression lz4\n\n"
     "Exit code: 0 written, 2 bad input.";
@@ -97,6 +99,8 @@ Run add_convert(CLI::App& program) {
                                                                                {"lz4", logs::McapCompression::lz4}})
               .description("{none,zstd,lz4}"))
       ->type_name("KIND");
+  command.add_option("--robot", a->robot, "Robot file (YAML) or model.json whose `columns:` name the log's columns")
+      ->type_name("FILE");
   add_map(command, a->common);
   return finish(command, a, kExamples, run);
 }

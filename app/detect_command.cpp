@@ -205,7 +205,8 @@ int run(const Arguments& a) {
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
-    say_lines(summary(incidents) + summary(detection, model) + summary(at_risk, model) + summary(kinematic, model));
+    say_lines(summary(incidents, [&](double t) { return logs::clock_time(log.report().files.front(), t); }) +
+              summary(detection, model) + summary(at_risk, model) + summary(kinematic, model));
     if (share > 0.0 && undecided.empty()) {
       say("not watched: {:.0f} % of the {} rows could not be decided on\n", 100.0 * share, log.report().rows_read);
     }

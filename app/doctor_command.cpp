@@ -62,7 +62,7 @@ int run(const Arguments& a) {
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
-    say_lines(words::summary(health, a.all));
+    say_lines(words::summary(health, a.all, [&](double t) { return logs::clock_time(log.report().files.front(), t); }));
     if (!a.common.out.empty()) {
       say("wrote {} and {}\n", (a.common.out / "doctor.json").string(), (a.common.out / "report.html").string());
     }

@@ -14,6 +14,9 @@ logs::LogOptions reader_options(const CommonOptions& options) {
   reader.msg_path = options.msg_path;
   reader.trust = options.trust;
   reader.map = options.columns;
+  for (const auto& [name, column] : options.columns) {
+    reader.or_by_name.push_back(name);
+  }
   for (const std::string& entry : options.map) {
     const std::size_t at = entry.find('=');
     if (at == std::string::npos || at == 0 || at + 1 == entry.size()) {
@@ -26,6 +29,7 @@ logs::LogOptions reader_options(const CommonOptions& options) {
                        core::listed(names) + files::did_you_mean(name, names));
     }
     reader.map[name] = entry.substr(at + 1);
+    std::erase(reader.or_by_name, name);
   }
   return reader;
 }

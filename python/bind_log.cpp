@@ -216,7 +216,11 @@ std::unique_ptr<LogObject> read_recorded(const Paths& paths, const RobotObject* 
                                          bool trust) {
   logs::LogOptions options = reader_options(robot, map, extra);
   if (robot != nullptr) {
-    options.map.merge(columns_of(*robot));
+    for (const auto& [name, column] : columns_of(*robot)) {
+      if (options.map.emplace(name, column).second) {
+        options.or_by_name.push_back(name);
+      }
+    }
   }
   options.msg_path = msg_path;
   options.trust = trust;

@@ -62,6 +62,16 @@ std::uint64_t most_unpacked(std::uint64_t packed) {
              : std::max(always_unpacked, largest_ratio * packed);
 }
 
+std::string ros1_bag(const std::filesystem::path& path) {
+  const std::filesystem::path bag = path.has_filename() ? path : path.parent_path();
+  const std::string name = bag.string();
+  const std::string to = (bag.parent_path() / bag.stem()).string() + "_ros2";
+  return fmt::format(
+      "is a ROS 1 bag: expected rosbag2 (MCAP, SQLite), HDF5 or CSV; `pip install rosbags`, then `rosbags-convert "
+      "--src {0} --dst {1}` makes a rosbag2 directory of it (older versions: `rosbags-convert {0} --dst {1}`)",
+      name, to);
+}
+
 std::string too_much_unpacked(std::uint64_t packed) {
   return fmt::format(
       "more than {} bytes come out of its {}: expected at most {}, or {} times its size; unpack it first, or read a "
@@ -242,12 +252,107 @@ class ZstdSource final : public FileSource {
   bool between_frames_ = true;
 };
 
+/// UTF-16 as UTF-8, its byte order mark included; what is no character is U+FFFD.
+class Utf16Source final : public FileSource {
+ public:
+  Utf16Source(RawFile raw, std::string head, bool big_endian)
+      : FileSource(std::move(raw), std::move(head), std::nullopt), big_endian_(big_endian), buffer_(bytes_at_once) {}
+
+  std::size_t read(char* to, std::size_t size) override {
+    while (used_ == ready_.size() && refill()) {
+    }
+    const std::size_t take = std::min(size, ready_.size() - used_);
+    std::memcpy(to, ready_.data() + used_, take);
+    used_ += take;
+    return take;
+  }
+  [[nodiscard]] const char* packing() const override { return "plain"; }
+
+ private:
+  bool refill() {
+    ready_.clear();
+    used_ = 0;
+    const std::size_t size = read_raw(buffer_.data(), buffer_.size());
+    for (std::size_t k = 0; k < size; ++k) {
+      const auto byte = static_cast<unsigned char>(buffer_[k]);
+      if (!first_) {
+        first_ = byte;
+        continue;
+      }
+      add(static_cast<std::uint32_t>(big_endian_ ? *first_ << 8U | byte : byte << 8U | *first_));
+      first_.reset();
+    }
+    if (size == 0 && (high_ != 0 || first_)) {
+      high_ = 0;
+      first_.reset();
+      put(replacement);
+      return true;
+    }
+    return size > 0;
+  }
+
+  void add(std::uint32_t unit) {
+    const bool low = unit >= 0xDC00U && unit < 0xE000U;
+    if (high_ != 0) {
+      put(low ? 0x10000U + ((high_ - 0xD800U) << 10U) + (unit - 0xDC00U) : replacement);
+    }
+    const bool paired = high_ != 0 && low;
+    high_ = unit >= 0xD800U && unit < 0xDC00U ? unit : 0;
+    if (!paired && high_ == 0) {
+      put(low ? replacement : unit);
+    }
+  }
+
+  void put(std::uint32_t character) {
+    const auto tail = [&](unsigned shift) { ready_ += static_cast<char>(0x80U | ((character >> shift) & 0x3FU)); };
+    if (character < 0x80U) {
+      ready_ += static_cast<char>(character);
+    } else if (character < 0x800U) {
+      ready_ += static_cast<char>(0xC0U | (character >> 6U));
+      tail(0);
+    } else if (character < 0x10000U) {
+      ready_ += static_cast<char>(0xE0U | (character >> 12U));
+      tail(6);
+      tail(0);
+    } else {
+      ready_ += static_cast<char>(0xF0U | (character >> 18U));
+      tail(12);
+      tail(6);
+      tail(0);
+    }
+  }
+
+  static constexpr std::uint32_t replacement = 0xFFFDU;
+  bool big_endian_;
+  std::vector<char> buffer_;
+  std::string ready_;
+  std::size_t used_ = 0;
+  std::optional<unsigned> first_;  ///< byte of a unit whose second is still to come
+  std::uint32_t high_ = 0;         ///< first half of a pair, 0: none
+};
+
+/// Whether `head` is UTF-16 without a byte order mark, by the zeros of its ASCII: its byte order; else nothing.
+std::optional<bool> unmarked_utf16(std::string_view head) {
+  constexpr std::size_t enough = 8;
+  for (const std::size_t zero : {std::size_t{0}, std::size_t{1}}) {
+    bool all = head.size() >= enough;
+    for (std::size_t k = 0; all && k < head.size(); ++k) {
+      const auto byte = static_cast<unsigned char>(head[k]);
+      all = k % 2 == zero ? byte == 0 : byte >= 0x09 && byte < 0x7F;
+    }
+    if (all) {
+      return zero == 0;
+    }
+  }
+  return std::nullopt;
+}
+
 struct Magic {
   std::string_view bytes;
   std::string_view format;
 };
 
-constexpr std::array<Magic, 9> not_text = {{{"PK\x03\x04", "a zip archive"},
+constexpr std::array<Magic, 7> not_text = {{{"PK\x03\x04", "a zip archive"},
                                             {"SQLite format 3", "an SQLite file (rosbag2?)"},
                                             {"\x89HDF", "an HDF5 file"},
                                             {"\x89MCAP", "an MCAP file"},
@@ -255,8 +360,6 @@ constexpr std::array<Magic, 9> not_text = {{{"PK\x03\x04", "a zip archive"},
                                              "7zXZ",
                                              "an xz file"},
                                             {"BZh", "a bzip2 file"},
-                                            {"\xFF\xFE", "UTF-16 text"},
-                                            {"\xFE\xFF", "UTF-16 text"},
                                             {"\x7F"
                                              "ELF",
                                              "a program"}}};
@@ -289,6 +392,16 @@ std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool h
   }
   if (is_zstd(start)) {
     return std::make_unique<ZstdSource>(std::move(raw), std::move(head), packed);
+  }
+  if (start.starts_with("\xFF\xFE") || start.starts_with("\xFE\xFF")) {
+    const bool big_endian = start.starts_with("\xFE");
+    return std::make_unique<Utf16Source>(std::move(raw), std::move(head), big_endian);
+  }
+  if (const std::optional<bool> big_endian = unmarked_utf16(start)) {
+    return std::make_unique<Utf16Source>(std::move(raw), std::move(head), *big_endian);
+  }
+  if (start.starts_with(ros1_bag_magic)) {
+    raw.fail(ros1_bag(path));
   }
   for (const Magic& magic : not_text) {
     if (start.starts_with(magic.bytes)) {

@@ -64,9 +64,15 @@ class ByteSource {
 /// "more than 67108864 bytes come out of its 1042: expected …", when that was too much for a file of `packed` bytes.
 [[nodiscard]] std::string too_much_unpacked(std::uint64_t packed);
 
-/// Opens `path`. Throws InputError, naming it, when it is missing, a directory, not a regular file, empty, unreadable,
-/// or a known format that is not text (zip, SQLite, HDF5, MCAP, xz, bzip2, UTF-16). Its source throws, without
-/// `unlimited`, where more than most_unpacked() bytes come out.
+/// First bytes of a ROS 1 bag, of every version.
+inline constexpr std::string_view ros1_bag_magic = "#ROSBAG V";
+
+/// "is a ROS 1 bag: expected …", with the commands that convert the one at `path`.
+[[nodiscard]] std::string ros1_bag(const std::filesystem::path& path);
+
+/// Opens `path`; UTF-16 comes out as UTF-8. Throws InputError, naming it, when it is missing, a directory, not a
+/// regular file, empty, unreadable, or a known format that is not text (zip, SQLite, HDF5, MCAP, xz, bzip2, a ROS 1
+/// bag). Its source throws, without `unlimited`, where more than most_unpacked() bytes come out.
 [[nodiscard]] std::unique_ptr<ByteSource> open_bytes(const std::filesystem::path& path, bool hashed = false,
                                                      bool unlimited = false);
 

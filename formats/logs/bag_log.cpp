@@ -269,6 +269,7 @@ class BagWalk final : public RowWalk {
     }
     const std::int64_t whole_seconds = origin_ / one_second;
     file.time_origin = static_cast<double>(whole_seconds);
+    file.time_zone = "UTC";
     file.header = plan_.choice.header;
     for (const std::string& field : plan_.choice.header) {
       if (!is_used(field)) {

@@ -118,9 +118,6 @@ struct BagTopicView {
 [[nodiscard]] BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,
                                            const std::string& path);
 
-/// Origin of the times of all bags of a log, ns: set by the first that is opened.
-using TimeOrigin = std::shared_ptr<std::optional<std::int64_t>>;
-
 /// A bag (file or directory) as a file of a log. Columns are those of choose_bag_columns(), clocks those of
 /// bag_clocks(), and values of other topics are interpolated as StreamAligner does, over at most 5 of their median
 /// steps; rows where that cannot be are dropped and counted. Times that begin later than 10⁸ s (stamps of a wall clock)

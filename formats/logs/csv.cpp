@@ -32,6 +32,10 @@ struct FileWalk {
       : lines(files::open_bytes(path, hashed, trust), path.string()) {}
 
   bool next(std::string_view& line) {
+    if (std::exchange(is_back, false)) {
+      line = back;
+      return true;
+    }
     while (lines.next(line)) {
       if (is_csv_content(line)) {
         return true;
@@ -40,15 +44,31 @@ struct FileWalk {
     return false;
   }
 
+  /// Makes `line`, the last that was read, the next.
+  void put_back(std::string_view line) {
+    back = line;
+    is_back = true;
+  }
+
   files::LineReader lines;
+  std::string back;
+  bool is_back = false;
 };
 
 CsvHeader header_of(FileWalk& walk, const CsvOptions& options, const std::string& path) {
   std::string_view line;
-  if (!walk.next(line)) {
+  if (!walk.next(line) || (names_separator(line) && !walk.next(line))) {
     throw InputError(path + ": no header line: expected the names of the columns, then rows");
   }
-  return read_csv_header(line, options, fmt::format("{}:{}", path, walk.lines.number()));
+  const std::string header(line), place = fmt::format("{}:{}", path, walk.lines.number());
+  std::optional<std::vector<std::string>> units;
+  if (walk.next(line)) {
+    units = units_in_line(header, line);
+    if (!units) {
+      walk.put_back(line);
+    }
+  }
+  return read_csv_header(header, options, place, units.value_or(std::vector<std::string>()));
 }
 
 /// Names (time apart) of what `header` has, in the order of its fields.
@@ -94,8 +114,10 @@ void note_left_out(const CsvHeader& header, const std::vector<std::string>& name
 /// What the first rows of a file tell of all.
 struct FirstRows {
   std::vector<CsvStream> streams;
+  TimeOrigin origin;                ///< of all files of the log
   std::optional<CountUnit> counts;  ///< unit of the times, where their steps tell another than their size
   std::string time_note;            ///< why the times may be in another unit; empty where they look like s
+  std::string time_remedy;          ///< the argument that makes s of them, where one is known
 };
 
 /// FIELD*FACTOR as an argument, for a column that may have a factor already.
@@ -112,12 +134,17 @@ void describe_file(const FileWalk& lines, const CsvHeader& header, const std::ve
   if (!first.time_note.empty()) {
     file.notes.push_back(first.time_note);
   }
+  file.time_remedy = first.time_remedy;
   if (rows.heading().degrees()) {
     file.notes.push_back(fmt::format("theta looks like degrees, since it jumps by nearly 360: expected rad, or {}",
                                      with_factor(header, "theta", std::numbers::pi / 180.0)));
   }
+  file.time_origin = static_cast<double>(rows.clock_origin());
+  file.time_zone = rows.clock_zone();
+  if (rows.day_or_month()) {
+    file.notes.push_back("day and month of its dates could change places: the day was taken to stand first");
+  }
   if (!rows.clock_unit().empty()) {
-    file.time_origin = rows.clock_origin();
     file.notes.push_back(fmt::format("times are counts of {}, and were read as such", rows.clock_unit()));
   }
   for (const auto& [name, factor] : header.factors) {
@@ -133,6 +160,7 @@ void describe_file(const FileWalk& lines, const CsvHeader& header, const std::ve
 }
 
 void begin_rows(CsvRowReader& rows, const CsvHeader& header, const std::string& path, const FirstRows& first) {
+  rows.share_origin(first.origin);
   rows.begin_file(header, path);
   if (first.counts) {
     rows.assume_counts(*first.counts);
@@ -353,19 +381,23 @@ class UnnamedIndex {
 };
 
 constexpr double longest_plausible = 1.0, shortest_plausible = 1e-5;  ///< s, median steps of a robot's log
+constexpr double shortest_usual = 2.5e-4;                             ///< s, from which on nobody asks for the unit
 
-/// The one of `units` in which a median step of `step` of them is that of a robot's log; nullptr where none is, or two.
-const CountUnit* unit_of_step(double step, std::span<const CountUnit> units) {
-  const CountUnit* found = nullptr;
+/// The ones of `units` in which a median step of `step` of them is that of a robot's log, by one clock in s.
+std::vector<CountUnit> units_of_step(double step, std::span<const CountUnit> units, double least, double most) {
+  std::vector<CountUnit> found;
   for (const CountUnit& unit : units) {
-    if (step * unit.seconds >= 2e-4 && step * unit.seconds <= 0.5) {
-      if (found != nullptr) {
-        return nullptr;
-      }
-      found = &unit;
+    if (step * unit.seconds >= least && step * unit.seconds <= most) {
+      found.push_back(unit);
     }
   }
   return found;
+}
+
+/// The one that units_of_step() finds; nullopt where there is none, or two.
+std::optional<CountUnit> unit_of_step(double step, std::span<const CountUnit> units) {
+  const std::vector<CountUnit> found = units_of_step(step, units, 2e-4, 0.5);
+  return found.size() == 1 ? std::optional(found.front()) : std::nullopt;
 }
 
 bool is_implausible(double step) {
@@ -376,27 +408,43 @@ bool is_implausible(double step) {
 /// the year 1 (.NET): as ns they are months of 1974 and 1990, in which no robot was logged to the nanosecond.
 bool is_time_of_ticks(double t) { return (t > 1.26e8 && t < 1.42e8) || (t > 6.31e8 && t < 6.47e8); }
 
-/// What is wrong with the unit of times whose median step is `step`, of which one is `t` (s, counted from where the
-/// rows' clock begins). It says which unit they look like where only one makes the step that of a robot's log.
-std::string note_on_times(const CsvHeader& header, const CsvRowReader& rows, double t, double step) {
-  if (rows.clock_unit() == "ns" && is_time_of_ticks(rows.clock_origin())) {
-    return "the times look like ticks of 100 ns, not ns since 1970: expected s, or " + with_factor(header, "t", 1e-7);
+/// Sets what is wrong with the unit of times whose median step is `step`, of which one is `t` (s, counted from where
+/// the rows' clock begins), and what cures it where that is known: where a unit makes the step that of a robot's log.
+void note_on_times(const CsvHeader& header, const CsvRowReader& rows, double t, double step, FirstRows& first) {
+  if (rows.clock_unit() == "ns" && is_time_of_ticks(static_cast<double>(rows.clock_origin()))) {
+    first.time_remedy = with_factor(header, "t", 1e-7);
+    first.time_note = "the times look like ticks of 100 ns, not ns since 1970: expected s, or " + first.time_remedy;
+    return;
   }
-  if (!is_implausible(step)) {
-    return {};
+  if ((!is_implausible(step) && !(step > 0.0 && step < shortest_usual)) || rows.reads_moments()) {
+    return;
   }
   constexpr std::array<CountUnit, 1> days = {{{86400.0, "days, as a spreadsheet writes them"}}};
+  constexpr std::array<CountUnit, 3> long_units = {{{60.0, "min"}, {3600.0, "h"}, {86400.0, "days"}}};
   const bool serial = t > 3e4 && t < 6e4;  // days since 1900, from 1982 on
-  const CountUnit* unit = !rows.clock_unit().empty() ? nullptr
-                          : step > longest_plausible ? unit_of_step(step, count_units)
-                          : serial                   ? unit_of_step(step, days)
-                                                     : nullptr;
-  const std::string what = fmt::format("the median step is {:.4g} s: ", step);
-  return unit == nullptr
-             ? what + fmt::format("expected times in s, or --map t=\"{}*FACTOR\" where FACTOR makes s of them",
-                                  header.fields[header.found.at("t")])
-             : what + fmt::format("the times look like {}, not s: expected s, or {}", unit->name,
-                                  with_factor(header, "t", unit->seconds));
+  std::vector<CountUnit> units;
+  if (rows.clock_unit().empty() && step > longest_plausible) {
+    units = units_of_step(step, count_units, 2e-4, 0.5);
+    units.resize(units.size() == 1 ? 1 : 0);
+  } else if (rows.clock_unit().empty()) {
+    units = serial ? units_of_step(step, days, 2e-4, 0.5) : units_of_step(step, long_units, 1e-3, 0.2);
+  }
+  std::vector<std::string> remedies, names;
+  for (const CountUnit& unit : units) {
+    names.push_back(units.size() == 1 ? std::string(unit.name)
+                                      : fmt::format("{} (then {:.3g} Hz)", unit.name, 1.0 / (step * unit.seconds)));
+    remedies.push_back(with_factor(header, "t", unit.seconds));
+  }
+  first.time_remedy = core::listed(remedies, " or ");
+  if (!is_implausible(step)) {
+    return;
+  }
+  first.time_note = fmt::format("the median step is {:.4g} s: ", step) +
+                    (units.empty() ? fmt::format("expected times in s, or --map t=\"{}*FACTOR\" where FACTOR makes s "
+                                                 "of them",
+                                                 header.fields[header.found.at("t")])
+                                   : fmt::format("the times look like {}, not s: expected s, or {}",
+                                                 core::listed(names, " or "), first.time_remedy));
 }
 
 /// The unit of counts that were taken for `guessed` by their size: another where the median `step`, in s of the guess,
@@ -404,13 +452,13 @@ std::string note_on_times(const CsvHeader& header, const CsvRowReader& rows, dou
 std::optional<CountUnit> unit_by_step(std::string_view guessed, double step) {
   const auto unit = std::ranges::find(count_units, guessed, &CountUnit::name);
   const bool doubtful = unit != count_units.end() && is_implausible(step);
-  const CountUnit* other = doubtful ? unit_of_step(step / unit->seconds, count_units) : nullptr;
-  return other == nullptr ? std::nullopt : std::optional(*other);
+  return doubtful ? unit_of_step(step / unit->seconds, count_units) : std::nullopt;
 }
 
 class CsvFile final : public RowFile {
  public:
-  CsvFile(std::filesystem::path path, CsvOptions options) : path_(std::move(path)), options_(std::move(options)) {
+  CsvFile(std::filesystem::path path, CsvOptions options, TimeOrigin origin)
+      : path_(std::move(path)), options_(std::move(options)), origin_(std::move(origin)) {
     FileWalk lines(path_, false, options_.trust);
     const CsvHeader header = header_of(lines, options_, path_.string());
     names_ = names_of(header);
@@ -468,6 +516,7 @@ class CsvFile final : public RowFile {
     UnnamedIndex index(header);
     std::string_view line;
     first_ = {};
+    first_.origin = origin_;
     try {
       for (std::size_t k = 0; k < rows_looked_at && lines.next(line); ++k) {
         if (rows.read_numbers(line, lines.lines.number(), lines.lines.terminated())) {
@@ -499,7 +548,7 @@ class CsvFile final : public RowFile {
     const double step = static_cast<double>(first_.streams.front().median_step) * 1e-9;
     first_.counts = unit_by_step(rows.clock_unit(), step);
     if (!first_.counts) {
-      first_.time_note = note_on_times(header, rows, rows.row()[0], step);
+      note_on_times(header, rows, rows.row()[0], step, first_);
       return;
     }
     const double ratio =
@@ -513,6 +562,7 @@ class CsvFile final : public RowFile {
   CsvOptions options_;
   std::vector<std::string> names_;
   std::vector<std::string> looked_for_;
+  TimeOrigin origin_;
   FirstRows first_;
 };
 
@@ -521,16 +571,18 @@ std::vector<std::unique_ptr<RowFile>> csv_files(const std::vector<std::filesyste
   check::that(!paths.empty(), "paths", "at least one file");
   check::that(options.block_rows > 0, "block_rows", "at least 1");
   std::vector<std::unique_ptr<RowFile>> files;
+  const auto origin = std::make_shared<std::optional<std::int64_t>>();
   for (const auto& path : paths) {
-    files.push_back(csv_file(path, options));
+    files.push_back(csv_file(path, options, origin));
   }
   return files;
 }
 
 }  // namespace
 
-std::unique_ptr<RowFile> csv_file(const std::filesystem::path& path, const CsvOptions& options) {
-  return std::make_unique<CsvFile>(path, options);
+std::unique_ptr<RowFile> csv_file(const std::filesystem::path& path, const CsvOptions& options,
+                                  const TimeOrigin& origin) {
+  return std::make_unique<CsvFile>(path, options, origin);
 }
 
 CsvLog::CsvLog(const std::vector<std::filesystem::path>& paths, const CsvOptions& options)
@@ -576,6 +628,7 @@ CsvRowParser::CsvRowParser(std::string_view header, const CsvOptions& options, d
   impl_->header = read_csv_header(header, options, name + ":1");
   impl_->names = names_of(impl_->header);
   impl_->rows = std::make_unique<CsvRowReader>(impl_->names, &impl_->report);
+  impl_->rows->keep_seconds();
   impl_->rows->begin_file(impl_->header, std::move(name));
   impl_->learning = median_step == 0.0;
   if (!impl_->learning) {

@@ -3,8 +3,11 @@
 /// CSV logs: read in bounded memory and cleaned on the way, or row by row from a live stream; written.
 ///
 /// A file has a header line with the names of its columns in any order (see recorded_log.hpp for the spellings that are
-/// known), then one row a line. Separators , ; or tab; LF or CRLF; blank lines and lines that begin with # are skipped;
-/// plain text, gzip or zstd, told apart by the first bytes. Fields that are not used may hold anything.
+/// known), then one row a line; a second line may have the columns' units, and a line "sep=;" may stand before both.
+/// Separators , ; or tab; decimal points, or commas where none of both is meant to separate; LF or CRLF; blank lines
+/// and lines that begin with # are skipped; UTF-8 or UTF-16, gzip or zstd, told apart by the first bytes. Times are s,
+/// or dates, times of the day or durations (wall_clock.hpp), or whole counts since 1970. Fields that are not used may hold
+/// anything.
 #pragma once
 
 #include <cstddef>
@@ -40,8 +43,9 @@ class CsvLog final : public RowLog {
   explicit CsvLog(const std::vector<std::filesystem::path>& paths, const CsvOptions& options = {});
 };
 
-/// One file of such a log. Throws InputError as CsvLog does for its header.
-[[nodiscard]] std::unique_ptr<RowFile> csv_file(const std::filesystem::path& path, const CsvOptions& options);
+/// One file of such a log; `origin` is that of all its files. Throws InputError as CsvLog does for its header.
+[[nodiscard]] std::unique_ptr<RowFile> csv_file(const std::filesystem::path& path, const CsvOptions& options,
+                                                const TimeOrigin& origin);
 
 /// The same cleaning for rows that come one at a time (standard input of `detect --follow`).
 class CsvRowParser {

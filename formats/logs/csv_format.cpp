@@ -25,6 +25,7 @@
 #include "formats/logs/known_logger.hpp"
 #include "formats/logs/log_file.hpp"
 #include "formats/logs/recorded_log.hpp"
+#include "formats/logs/wall_clock.hpp"
 
 namespace wheelwright::logs {
 
@@ -62,11 +63,14 @@ void check_is_text(std::string_view line, const std::string& place) {
 }
 
 void check_has_names(const std::vector<std::string>& fields, const std::string& place) {
-  const bool numbers = std::all_of(fields.begin(), fields.end(),
-                                   [](const std::string& f) { return f.empty() || files::to_number(f).has_value(); });
-  if (numbers) {
-    throw InputError(fmt::format("{}: {}: expected a header line with the names of the columns (t, omega_r, ...)",
-                                 place, shown(core::listed(fields))));
+  const auto is_number = [](const std::string& f) { return files::to_number(f).has_value(); };
+  const bool numbers =
+      std::all_of(fields.begin(), fields.end(), [&](const std::string& f) { return f.empty() || is_number(f); });
+  const bool echoed = fields.size() > 2 && is_number(fields[0]) && is_number(fields[1]);
+  if (numbers || echoed) {
+    throw InputError(fmt::format("{}: {}: expected a header line with the names of the columns (t, omega_r, ...){}",
+                                 place, shown(core::listed(fields)),
+                                 echoed ? headerless_logger(fields, place.substr(0, place.rfind(':'))) : ""));
   }
 }
 
@@ -112,24 +116,47 @@ constexpr ForeignUnit foreign_units[] = {
     {"rpm", "rad/s", per_rpm},
     {"rev/min", "rad/s", per_rpm},
     {"1/min", "rad/s", per_rpm},
+    {"u/min", "rad/s", per_rpm},
+    {"tr/min", "rad/s", per_rpm},
+    {"r/min", "rad/s", per_rpm},
+    {"min-1", "rad/s", per_rpm},
     {"rps", "rad/s", per_turn},
     {"rev/s", "rad/s", per_turn},
     {"turns/s", "rad/s", per_turn},
     {"dps", "rad/s", per_degree},
     {"deg/s", "rad/s", per_degree},
     {"°/s", "rad/s", per_degree},
+    {"deg/sec", "rad/s", per_degree},
+    {"degrees/s", "rad/s", per_degree},
     {"mrad/s", "rad/s", 1e-3},
+    {"rad/sec", "rad/s", 1.0},
+    {"radians/s", "rad/s", 1.0},
+    {"rads/s", "rad/s", 1.0},
     {"deg", "rad", per_degree},
+    {"degree", "rad", per_degree},
     {"degrees", "rad", per_degree},
+    {"radian", "rad", 1.0},
+    {"radians", "rad", 1.0},
+    {"rads", "rad", 1.0},
     {"°", "rad", per_degree},
     {"rev", "rad", per_turn},
     {"turns", "rad", per_turn},
     {"mrad", "rad", 1e-3},
     {"ma", "A", 1e-3},
+    {"amp", "A", 1.0},
+    {"amps", "A", 1.0},
     {"mv", "V", 1e-3},
+    {"volt", "V", 1.0},
+    {"volts", "V", 1.0},
     {"mnm", "N·m", 1e-3},
     {"nmm", "N·m", 1e-3},
     {"ncm", "N·m", 1e-2},
+    {"n-m", "N·m", 1.0},
+    {"kgfcm", "N·m", 9.80665e-2},
+    {"kgcm", "N·m", 9.80665e-2},
+    {"kg-cm", "N·m", 9.80665e-2},
+    {"ozin", "N·m", 7.0615518e-3},
+    {"oz-in", "N·m", 7.0615518e-3},
     {"mm", "m", 1e-3},
     {"cm", "m", 1e-2},
     {"km", "m", 1e3},
@@ -138,7 +165,22 @@ constexpr ForeignUnit foreign_units[] = {
     {"µs", "s", 1e-6},
     {"μs", "s", 1e-6},
     {"ns", "s", 1e-9},
+    {"sec", "s", 1.0},
+    {"secs", "s", 1.0},
+    {"seconds", "s", 1.0},
+    {"msec", "s", 1e-3},
+    {"milliseconds", "s", 1e-3},
+    {"usec", "s", 1e-6},
+    {"microseconds", "s", 1e-6},
+    {"nsec", "s", 1e-9},
+    {"nanoseconds", "s", 1e-9},
     {"min", "s", 60.0},
+    {"minutes", "s", 60.0},
+    {"h", "s", 3600.0},
+    {"hr", "s", 3600.0},
+    {"hours", "s", 3600.0},
+    {"d", "s", 86400.0},
+    {"days", "s", 86400.0},
     {"g", "m/s²", 9.80665},
     {"mm/s", "m/s", 1e-3},
     {"km/h", "m/s", 1.0 / 3.6},
@@ -204,6 +246,34 @@ const LogColumn* column_of_field(const std::string& field) {
   return nullptr;
 }
 
+/// Field `k` with the unit that the second line gives it.
+std::string meant(const CsvHeader& header, std::size_t k) {
+  const bool unit = k < header.units.size() && !header.units[k].empty();
+  return unit ? fmt::format("{} [{}]", header.fields[k], header.units[k]) : header.fields[k];
+}
+
+/// The column that `field` is called like, in a unit that is known and not the contract's own, and what makes its own
+/// of it; nullptr where it is none. A unit that merely stands behind a '_' is not taken for min, h or d: t_min may be
+/// the least.
+std::pair<const LogColumn*, double> foreign_column_of(std::string_view field) {
+  for (const auto& [name, unit, marked, own_taken] : cut_units(field)) {
+    const LogColumn* column = recognise_log_column(name);
+    const ForeignUnit* known = column == nullptr ? nullptr : find_foreign_unit(unit, column->unit);
+    if (known != nullptr && (marked || column->name != "t" || known->factor <= 1.0)) {
+      return {column, known->factor};
+    }
+  }
+  return {nullptr, 1.0};
+}
+
+/// Whether `unit` is one of any column.
+bool is_known_unit(std::string_view unit) {
+  return std::ranges::any_of(log_columns(), [&](const LogColumn& column) {
+    return find_foreign_unit(unit, column.unit) != nullptr ||
+           recognise_log_column(fmt::format("{} [{}]", column.name, unit)) != nullptr;
+  });
+}
+
 /// Whether field `k` is one of the columns that were found.
 bool is_taken(const CsvHeader& header, std::size_t k) {
   return std::ranges::any_of(header.found, [&](const auto& found) { return found.second == k; });
@@ -213,11 +283,11 @@ bool is_wanted(const CsvOptions& options, const std::string& name) {
   return name == "t" || !options.only || std::ranges::find(*options.only, name) != options.only->end();
 }
 
-/// Why `field` is not taken for the column that it is called like: a unit of its own. Nothing where that is not so, or
-/// the column is not `missing`.
+/// Why `field`, which is `with_unit`, is not taken for the column that it is called like: a unit of its own. Nothing
+/// where that is not so, or the column is not `missing`.
 template <typename Missing>
-std::string unit_note(const std::string& field, const Missing& missing) {
-  for (const auto& [name, unit, marked, own_taken] : cut_units(field)) {
+std::string unit_note(const std::string& field, const std::string& with_unit, const Missing& missing) {
+  for (const auto& [name, unit, marked, own_taken] : cut_units(with_unit)) {
     const LogColumn* column = recognise_log_column(name);
     if (column == nullptr || unit.empty() || files::to_number(unit) || !missing(column->name)) {
       continue;
@@ -239,7 +309,7 @@ void note_units(CsvHeader& header, const CsvOptions& options) {
     if (is_taken(header, k)) {
       continue;
     }
-    std::string note = unit_note(header.fields[k], [&](const std::string& name) {
+    std::string note = unit_note(header.fields[k], meant(header, k), [&](const std::string& name) {
       return !header.found.contains(name) && is_wanted(options, name);
     });
     if (!note.empty()) {
@@ -248,10 +318,12 @@ void note_units(CsvHeader& header, const CsvOptions& options) {
   }
 }
 
-void recognise(CsvHeader& header, const CsvOptions& options, const std::string& place) {
+/// Finds the columns that `column_of` sees in fields, with the factors that it gives.
+template <typename ColumnOf>
+void recognise(CsvHeader& header, const CsvOptions& options, const std::string& place, const ColumnOf& column_of) {
   std::map<std::string, std::vector<std::size_t>> candidates;
   for (std::size_t k = 0; k < header.fields.size(); ++k) {
-    const LogColumn* column = column_of_field(header.fields[k]);
+    const LogColumn* column = column_of(k).first;
     if (is_taken(header, k) || column == nullptr || header.found.contains(column->name) ||
         !is_wanted(options, column->name)) {
       continue;
@@ -269,10 +341,51 @@ void recognise(CsvHeader& header, const CsvOptions& options, const std::string& 
                                    place, shown(first), shown(second), name, name));
     }
     header.found[name] = fields.front();
+    if (const double factor = column_of(fields.front()).second; factor != 1.0) {
+      header.factors[name] = factor;
+    }
   }
 }
 
+std::string without_brackets(std::string_view unit) {
+  unit = trimmed_field(unit);
+  constexpr std::string_view opening = "[({<", closing = "])}>";
+  const std::size_t kind = unit.size() < 2 ? std::string_view::npos : opening.find(unit.front());
+  if (kind != std::string_view::npos && unit.back() == closing[kind]) {
+    unit = trimmed_field(unit.substr(1, unit.size() - 2));
+  }
+  return unit == "-" || unit == "1" ? std::string() : std::string(unit);
+}
+
 }  // namespace
+
+bool names_separator(std::string_view line) {
+  line = trimmed_field(line);
+  line = line.size() > 2 && line.front() == '"' && line.back() == '"' ? line.substr(1, line.size() - 2) : line;
+  return line.size() <= 5 && (line.starts_with("sep=") || line.starts_with("SEP="));
+}
+
+std::optional<std::vector<std::string>> units_in_line(std::string_view header, std::string_view line) {
+  const char separator = find_separator(header);
+  const std::size_t columns = split_fields(header, separator).size();
+  std::vector<std::string> units = split_fields(line, separator);
+  if (units.size() == columns + 1 && units.back().empty()) {
+    units.pop_back();
+  }
+  std::size_t texts = 0, known = 0;
+  for (std::string& unit : units) {
+    if (unit.empty()) {
+      continue;
+    }
+    if (files::to_number(unit) && unit != "1") {
+      return std::nullopt;
+    }
+    unit = without_brackets(unit);
+    texts += unit.empty() ? 0 : 1;
+    known += !unit.empty() && is_known_unit(unit) ? 1 : 0;
+  }
+  return units.size() == columns && known > 0 && 2 * known >= texts ? std::optional(std::move(units)) : std::nullopt;
+}
 
 std::vector<std::string> split_fields(std::string_view line, char separator) {
   std::vector<std::string> fields(1);
@@ -312,14 +425,22 @@ std::pair<std::string, double> split_factor(const std::string& text) {
              : std::pair{text, 1.0};
 }
 
-CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, const std::string& place) {
+CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, const std::string& place,
+                          std::vector<std::string> units) {
   check_is_text(line, place);
   CsvHeader header;
+  header.units = std::move(units);
   header.separator = find_separator(line);
   header.fields = split_fields(line, header.separator);
   check_has_names(header.fields, place);
   for (const auto& [name, column] : options.map) {
     const auto [field, factor] = find_field(header.fields, column) ? std::pair{column, 1.0} : split_factor(column);
+    if (!find_field(header.fields, field) && std::ranges::count(header.fields, name) == 1 &&
+        std::ranges::count(options.or_by_name, name) > 0) {
+      header.found[name] = *find_field(header.fields, name);
+      header.notes.push_back(by_its_own_name(field, name));
+      continue;
+    }
     header.found[name] = demand_field(header.fields, field, "which --map " + name + "=" + column + " names", place);
     if (factor != 1.0) {
       header.factors[name] = factor;
@@ -330,15 +451,16 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
       header.found[name] = demand_field(header.fields, name, "which was asked for", place);
     }
   }
-  recognise(header, options, place);
+  recognise(header, options, place, [&](std::size_t k) { return std::pair(column_of_field(meant(header, k)), 1.0); });
+  recognise(header, options, place, [&](std::size_t k) { return foreign_column_of(meant(header, k)); });
   note_units(header, options);
   if (!header.found.contains("t")) {
-    std::string units;
+    std::string notes;
     for (const std::string& note : header.notes) {
-      units += "; " + note;
+      notes += "; " + note;
     }
     throw InputError(fmt::format("{}: no column for t (time, s): expected one of {}{}; see --map t=COLUMN{}{}", place,
-                                 core::listed(header.fields), files::did_you_mean("time", header.fields), units,
+                                 core::listed(header.fields), files::did_you_mean("time", header.fields), notes,
                                  known_logger(header.fields)));
   }
   return header;
@@ -346,6 +468,11 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
 
 std::string map_argument(std::string_view name, std::string_view field, double factor) {
   return fmt::format("--map {}=\"{}*{:g}\"", name, field, factor);
+}
+
+std::string by_its_own_name(std::string_view field, std::string_view name) {
+  return fmt::format("there is no {}, which `columns:` names: {} was read by its own name", files::one_line(field),
+                     name);
 }
 
 void HeadingUnit::add(double theta) {
@@ -389,6 +516,7 @@ void CsvRowReader::begin_file(const CsvHeader& header, std::string path) {
   fields_ = header.fields;
   separator_ = header.separator;
   clock_ = {};
+  points_ = commas_ = false;
   heading_ = {};
   slots_.assign(fields_.size(), -1);
   const auto take = [&](const std::string& name, int slot) {
@@ -411,10 +539,11 @@ void CsvRowReader::begin_file(const CsvHeader& header, std::string path) {
     take(names_[c], static_cast<int>(c) + 1);
     theta_ = names_[c] == "theta" ? c + 1 : theta_;
   }
+  time_factor_ = header.factors.contains("t") ? header.factors.at("t") : 1.0;
   for (const auto& [name, factor] : header.factors) {
     const auto at = std::ranges::find(names_, name);
-    if (name == "t" || at != names_.end()) {
-      const std::size_t index = name == "t" ? 0 : static_cast<std::size_t>(at - names_.begin()) + 1;
+    if (at != names_.end()) {
+      const std::size_t index = static_cast<std::size_t>(at - names_.begin()) + 1;
       factors_.emplace_back(index, factor);
       limits_[index] /= std::abs(factor);
     }
@@ -449,10 +578,14 @@ std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
         q = read_odd_field(p, end, field, value, defect);
       } else {
         const std::string_view text(p, static_cast<std::size_t>(q - p));
-        if (slot == 0 && (!clock_.known || clock_.seconds < 1.0)) {
+        const bool point = (!points_ || commas_) && text.find('.') != std::string_view::npos;
+        points_ = points_ || point;
+        if (slot == 0 && (clock_.kind != Clock::Kind::plain || time_factor_ != 1.0)) {
           convert_time(text);
         }
-        if (!(std::abs(value) <= limits[index])) {
+        if ((point && commas_) || (slot == 0 && reads_moments() && std::isfinite(value))) {
+          defect = defect.fault == Fault::text ? defect : Defect{Fault::text, field, text};
+        } else if (!(std::abs(value) <= limits[index])) {
           const Fault fault = std::isfinite(value) ? Fault::limit : Fault::not_finite;
           if (fault == Fault::not_finite && may_miss(index)) {
             value = std::numeric_limits<double>::quiet_NaN();
@@ -470,32 +603,117 @@ std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
   }
 }
 
+/// Settles how times are written by the first of them: values_[0], and `count` where it is a whole number.
+void CsvRowReader::begin_clock(std::optional<std::int64_t> count) {
+  constexpr double a_year = 3.2e7;  // s: later than 1971, whichever unit
+  const double t = values_[0];
+  clock_.kind = Clock::Kind::plain;
+  const CountUnit* unit = nullptr;
+  if (count && time_factor_ == 1.0 && t > limits_[0]) {
+    unit = std::ranges::find_if(count_units, [&](const CountUnit& of) {
+      return clock_.assumed ? clock_.assumed->name == of.name
+                            : t * of.seconds > a_year && t * of.seconds < 1e3 * a_year;
+    });
+    unit = unit == count_units.end() ? nullptr : unit;
+    clock_.unit = unit == nullptr ? std::string_view() : unit->name;
+  } else if (count) {
+    unit = std::ranges::find(count_units, time_factor_, &CountUnit::seconds);
+    unit = unit == count_units.end() ? nullptr : unit;
+  }
+  if (unit != nullptr) {
+    clock_.kind = Clock::Kind::counts;
+    clock_.seconds = unit->seconds;
+    const std::int64_t second = *count / std::llround(1.0 / unit->seconds);
+    const bool since_1970 = is_since_1970(static_cast<double>(second));
+    clock_.zone = since_1970 ? "UTC" : "";
+    if (since_1970 || !clock_.unit.empty()) {
+      clock_.origin = common_origin(shared_origin_, second);
+    }
+  } else if (is_since_1970(t * time_factor_) && !keep_seconds_) {
+    clock_.kind = Clock::Kind::epoch;
+    clock_.zone = "UTC";
+    clock_.origin = common_origin(shared_origin_, static_cast<std::int64_t>(std::floor(t * time_factor_)));
+  }
+}
+
+/// Makes s since the clock's origin of values_[0], which is written as `text`.
 void CsvRowReader::convert_time(std::string_view text) {
   double& t = values_[0];
   if (!std::isfinite(t)) {
     return;
   }
   std::int64_t count = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-  const bool whole = error == std::errc() && end == text.data() + text.size() && count >= 0;
-  if (!clock_.known) {
-    clock_.known = true;
-    if (whole && t > limits_[0]) {
-      constexpr double a_year = 3.2e7;  // s: later than 1971, whichever unit
-      const auto assumed = clock_.assumed;
-      for (const auto& [seconds, unit] : count_units) {
-        if (assumed ? assumed->name == unit : t * seconds > a_year && t * seconds < 1e3 * a_year) {
-          const auto second = static_cast<std::int64_t>(std::round(1.0 / seconds));
-          clock_ = {true, seconds, unit, count / second * second, assumed};
-          break;
-        }
-      }
-    }
+  const char* const last = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), last, count);
+  const bool begins_whole = error == std::errc() && count >= 0;
+  const bool whole = begins_whole && end == last;
+  if (clock_.kind == Clock::Kind::unknown) {
+    begin_clock(whole ? std::optional(count) : std::nullopt);
   }
-  if (clock_.seconds < 1.0) {
-    t = (whole ? static_cast<double>(count - clock_.origin) : t - static_cast<double>(clock_.origin)) * clock_.seconds;
+  const auto origin = static_cast<double>(clock_.origin);
+  switch (clock_.kind) {
+    case Clock::Kind::counts: {
+      const std::int64_t from = clock_.origin * std::llround(1.0 / clock_.seconds);
+      t = (whole ? static_cast<double>(count - from) : t - static_cast<double>(from)) * clock_.seconds;
+      break;
+    }
+    case Clock::Kind::epoch: {
+      // The digits behind the point are those of a number of less digits before it.
+      const bool fraction = begins_whole && !whole && *end == '.' && count >= clock_.origin && time_factor_ == 1.0 &&
+                            std::all_of(end + 1, last, [](char c) { return c >= '0' && c <= '9'; });
+      const std::string less = fraction ? fmt::format("{}{}", count - clock_.origin,
+                                                      std::string_view(end, static_cast<std::size_t>(last - end)))
+                                        : std::string();
+      if (!fraction || files::parse_number(less.data(), less.data() + less.size(), t) == nullptr) {
+        t = t * time_factor_ - origin;
+      }
+      break;
+    }
+    case Clock::Kind::plain: t *= time_factor_; break;
+    case Clock::Kind::moments:
+    case Clock::Kind::unknown: break;
   }
 }
+
+/// Reads a time that is a date or the like; false where it is none, or the first of the file was not.
+bool CsvRowReader::read_moment(std::string_view text, double& t) {
+  if (clock_.kind != Clock::Kind::unknown && clock_.kind != Clock::Kind::moments) {
+    return false;
+  }
+  const std::optional<Moment> moment = parse_moment(text);
+  if (!moment || time_factor_ != 1.0 ||
+      (clock_.kind == Clock::Kind::moments && moment->since_1970 != clock_.since_1970)) {
+    return false;
+  }
+  constexpr std::int64_t ns = 1'000'000'000;
+  if (clock_.kind == Clock::Kind::unknown) {
+    clock_.kind = Clock::Kind::moments;
+    clock_.since_1970 = moment->since_1970;
+    clock_.zone = moment->utc ? "UTC" : "";
+    clock_.day_or_month = moment->day_or_month;
+    if (moment->since_1970) {
+      clock_.origin = common_origin(shared_origin_, moment->ns / ns);
+    }
+  }
+  t = static_cast<double>(moment->ns - clock_.origin * ns) * 1e-9;
+  return true;
+}
+
+namespace {
+
+/// Reads a number with one decimal comma, which is all of `text`; false where it is none.
+bool parse_decimal_comma(std::string_view text, double& value) {
+  const std::size_t comma = text.find(',');
+  if (comma == std::string_view::npos || text.find('.') != std::string_view::npos) {
+    return false;
+  }
+  std::string point(text);
+  point[comma] = '.';
+  const char* const end = point.data() + point.size();
+  return files::parse_number(point.data(), end, value) == end;
+}
+
+}  // namespace
 
 /// A field that is not plainly a number between separators: blanks, quotes, nothing, or text. Returns its end.
 const char* CsvRowReader::read_odd_field(const char* p, const char* end, std::size_t field, double& value,
@@ -521,14 +739,25 @@ const char* CsvRowReader::read_odd_field(const char* p, const char* end, std::si
     trim();
   }
   const std::string_view text(p, static_cast<std::size_t>(last - p));
+  const bool is_time = slots_[field] == 0;
+  const bool point = p != last && files::parse_number(p, last, value) == last;
+  const bool comma = p != last && !point && !points_ && parse_decimal_comma(text, value);
   Fault fault = Fault::none;
-  if (p == last || files::parse_number(p, last, value) != last) {
+  if (is_time && !point && !comma && read_moment(text, value)) {
+    fault = Fault::none;
+  } else if (!point && !comma) {
     fault = means_missing(text) ? Fault::empty : Fault::text;
   } else if (!std::isfinite(value)) {
     fault = Fault::not_finite;
+  } else if (is_time && reads_moments()) {
+    fault = Fault::text;
   } else {
-    if (slots_[field] == 0 && (!clock_.known || clock_.seconds < 1.0)) {
-      convert_time(text);
+    commas_ = commas_ || comma;
+    points_ = points_ || (point && text.find('.') != std::string_view::npos);
+    if (is_time && (clock_.kind != Clock::Kind::plain || time_factor_ != 1.0)) {
+      std::string plain(text);
+      std::ranges::replace(plain, ',', '.');
+      convert_time(plain);
     }
     if (!(std::abs(value) <= limits_[static_cast<std::size_t>(slots_[field])])) {
       fault = Fault::limit;
@@ -565,8 +794,10 @@ bool CsvRowReader::read_numbers(std::string_view line, std::size_t line_number, 
     return false;
   }
   if (!countable) {
-    throw InputError(fmt::format("{}: {} fields: expected {}, as the header has ({})", cleaner_.at(line_number), fields,
-                                 known, shown(line)));
+    throw InputError(fmt::format(
+        "{}: {} fields: expected {}, as the header has ({}){}", cleaner_.at(line_number), fields, known, shown(line),
+        separator_ == ',' && fields > known + 1 ? "; where numbers have decimal commas, write ; or tabs between them"
+                                                : ""));
   }
   if (defect.fault == Fault::text || defect.fault == Fault::limit) {
     throw InputError(cleaner_.at(line_number) + ": " + describe(defect));
@@ -588,8 +819,17 @@ bool CsvRowReader::read_numbers(std::string_view line, std::size_t line_number, 
 std::string CsvRowReader::describe(const Defect& defect) const {
   const std::string where = fmt::format("column {}: {}", shown(fields_[defect.field]), shown(defect.text));
   if (defect.fault == Fault::text) {
+    const bool is_time = slots_[defect.field] == 0;
     const bool comma = defect.text.find(',') != std::string_view::npos;
-    return fmt::format("{}: expected a number{}", where, comma ? " with a decimal point" : "");
+    if (is_time && reads_moments()) {
+      return where + ": expected a time that is written as those above it";
+    }
+    return fmt::format("{}: expected a number{}", where,
+                       comma && points_ ? " with a decimal point, as those above it have"
+                       : commas_        ? " with a decimal comma, as those above it have"
+                       : is_time && clock_.kind == Clock::Kind::unknown
+                           ? " of s, or a time like 2026-11-29 08:40:00.123 or 08:40:00.123"
+                           : "");
   }
   return fmt::format("{}: {}", where, cleaner_.expectation(static_cast<std::size_t>(slots_[defect.field])));
 }

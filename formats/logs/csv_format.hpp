@@ -25,6 +25,9 @@ struct CsvOptions {
   /// headers that no spelling covers (`--map name=column`). It goes before everything else. COLUMN*FACTOR multiplies
   /// what stands in COLUMN, for logs in other units, where no column is called so.
   std::map<std::string, std::string> map;
+  /// Names in `map` that a file may lack the column of, where it has one called by the name itself: a robot file's
+  /// `columns:` also takes what `convert` has written under the names of the contract.
+  std::vector<std::string> or_by_name;
   /// Further columns to read under their own names; a file that lacks one is an error.
   std::vector<std::string> extra;
   /// Where given, only these contract columns are read (and those in `map` and `extra`), as far as the files have them;
@@ -47,6 +50,7 @@ struct CsvHeader {
   std::map<std::string, std::size_t> found;  ///< wanted name (`t` among them) -> field
   std::map<std::string, double> factors;     ///< wanted name -> FACTOR of its field, where it has one
   std::vector<std::string> notes;            ///< fields called like a column and not taken for their unit, and why
+  std::vector<std::string> units;            ///< of a second line, without brackets, one for each field; else empty
 };
 
 /// A unit in which clocks count.
@@ -72,15 +76,28 @@ class HeadingUnit {
 /// `--map NAME="FIELD*FACTOR"`, as an argument of the program.
 [[nodiscard]] std::string map_argument(std::string_view name, std::string_view field, double factor);
 
+/// Says of CsvOptions::or_by_name that a file has the column `name` instead of `field`.
+[[nodiscard]] std::string by_its_own_name(std::string_view field, std::string_view name);
+
 /// COLUMN and FACTOR of COLUMN*FACTOR; the whole and 1 where it is none.
 [[nodiscard]] std::pair<std::string, double> split_factor(const std::string& text);
 
 /// Splits `line` at `separator`; quotes around a field are removed ("" inside them is one quote), and blanks around it.
 [[nodiscard]] std::vector<std::string> split_fields(std::string_view line, char separator);
 
-/// Reads the header `line`. `place` is "file:line" for messages. Throws InputError when it is binary or all numbers, a
-/// name of `map` or `extra` is not there, two fields mean the same column, or there is no time.
-[[nodiscard]] CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, const std::string& place);
+/// Reads the header `line`; `units` are those of a second line. Where a field's unit is a known one that is not the
+/// contract's own, it gets the factor that converts it. `place` is "file:line" for messages. Throws InputError when it
+/// is binary or begins with numbers, a name of `map` or `extra` is not there, two fields mean the same column, or there
+/// is no time.
+[[nodiscard]] CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, const std::string& place,
+                                        std::vector<std::string> units = {});
+
+/// The units that `line`, the second of a table whose first is `header`, gives instead of numbers: one for each field,
+/// without brackets, empty where none is. Nothing where it is no such line.
+[[nodiscard]] std::optional<std::vector<std::string>> units_in_line(std::string_view header, std::string_view line);
+
+/// Whether `line` is "sep=;" or the like, which Excel puts before the header.
+[[nodiscard]] bool names_separator(std::string_view line);
 
 /// True if `line` is neither blank nor a comment (#).
 [[nodiscard]] bool is_csv_content(std::string_view line);
@@ -97,8 +114,20 @@ class CsvRowReader {
 
   /// Unit of the times that were read where they are whole counts of a wall clock: "ms", "µs", "ns"; else nothing.
   [[nodiscard]] std::string_view clock_unit() const { return clock_.unit; }
-  /// What such times are counted from, s.
-  [[nodiscard]] double clock_origin() const { return static_cast<double>(clock_.origin) * clock_.seconds; }
+  /// What times are counted from, s: whole seconds where they are those of a wall clock, else 0.
+  [[nodiscard]] std::int64_t clock_origin() const { return clock_.origin; }
+  /// "UTC" where the times say so, or count from 1970; empty where they are of a zone that is not told, or no dates.
+  [[nodiscard]] std::string_view clock_zone() const { return clock_.zone; }
+  /// True where the times are dates, times of the day or durations; with a date of which day and month could change
+  /// places.
+  [[nodiscard]] bool reads_moments() const { return clock_.kind == Clock::Kind::moments; }
+  [[nodiscard]] bool day_or_month() const { return clock_.day_or_month; }
+
+  /// Takes the origin of the times from `origin` (ns) where it has one that is less than ten years away, and sets it
+  /// where it has none. Without it each file begins with its own.
+  void share_origin(TimeOrigin origin) { shared_origin_ = std::move(origin); }
+  /// Leaves times that are s since 1970 as they are.
+  void keep_seconds() { keep_seconds_ = true; }
 
   /// Takes times of the file just begun that lie beyond LogColumn::limit for counts of `unit`, whatever their size.
   void assume_counts(const CountUnit& unit) { clock_.assumed = unit; }
@@ -137,16 +166,28 @@ class CsvRowReader {
     std::string_view text;
   };
 
-  /// Times beyond LogColumn::limit are counts since 1970, of a unit that the first of a file tells by its size. A
-  /// double does not hold nanoseconds since 1970: they are taken from the first whole second.
+  /// How the times of a file are written, as the first of them tells. A double does not hold nanoseconds since 1970:
+  /// times of a wall clock are counted from a whole second.
   struct Clock {
-    bool known = false;
-    double seconds = 1.0;
-    std::string_view unit;
-    std::int64_t origin = 0;
-    std::optional<CountUnit> assumed;
+    enum class Kind {
+      unknown,  ///< no time was read yet
+      plain,    ///< numbers, times factor_
+      counts,   ///< whole counts of `seconds`
+      epoch,    ///< s since 1970, times factor_
+      moments,  ///< dates, times of the day, durations
+    };
+    Kind kind = Kind::unknown;
+    double seconds = 1.0;     ///< of a count
+    std::string_view unit{};  ///< of counts whose size told their unit
+    std::int64_t origin = 0;  ///< s
+    std::string_view zone{};
+    bool since_1970 = false;  ///< of moments
+    bool day_or_month = false;
+    std::optional<CountUnit> assumed{};
   };
+  void begin_clock(std::optional<std::int64_t> count);
   void convert_time(std::string_view text);
+  bool read_moment(std::string_view text, double& t);
 
   std::size_t read_fields(std::string_view line, Defect& defect);
   const char* read_odd_field(const char* p, const char* end, std::size_t field, double& value, Defect& defect);
@@ -159,6 +200,10 @@ class CsvRowReader {
   std::string path_;
   std::vector<std::string> fields_;
   Clock clock_;
+  double time_factor_ = 1.0;
+  TimeOrigin shared_origin_;
+  bool keep_seconds_ = false;
+  bool points_ = false, commas_ = false;  ///< whether numbers with a decimal point, with a comma were met
   HeadingUnit heading_;
   std::size_t theta_ = 0;   ///< index of the heading in values_, 0 where there is none
   std::vector<int> slots_;  ///< field -> index in values_, or −1

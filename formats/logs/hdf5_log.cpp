@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <map>
 #include <numeric>
@@ -24,6 +26,7 @@
 #include "formats/logs/log_file.hpp"
 #include "formats/logs/mcap_format.hpp"
 #include "formats/logs/recorded_log.hpp"
+#include "formats/logs/wall_clock.hpp"
 
 namespace wheelwright::logs {
 namespace {
@@ -560,6 +563,12 @@ class DatasetChooser {
 
   void take_mapped(const std::string& name, const std::string& mapped, const std::string& home) {
     const auto [place, factor] = find(mapped, home) != nullptr ? std::pair{mapped, 1.0} : split_factor(mapped);
+    if (find(place, home) == nullptr && find(name, home) != nullptr &&
+        std::ranges::count(options_.or_by_name, name) > 0) {
+      choice_.notes.push_back(by_its_own_name(place, name));
+      take(name, named(name, home, name));
+      return;
+    }
     Source source = named(place, home, name);
     source.factor = factor;
     take(name, std::move(source));
@@ -707,7 +716,7 @@ class DatasetChooser {
 class Hdf5Walk final : public RowWalk {
  public:
   Hdf5Walk(const std::filesystem::path& path, const Choice& choice, const std::vector<std::string>& names,
-           double longest_step, LogReport* report)
+           double longest_step, LogReport* report, TimeOrigin origin)
       : path_(path),
         choice_(choice),
         names_(names),
@@ -715,7 +724,8 @@ class Hdf5Walk final : public RowWalk {
         row_(names.size() + 1),
         hashed_(report != nullptr),
         file_(open_file(path)),
-        rows_(choice.found.at("t").line.rows) {
+        rows_(choice.found.at("t").line.rows),
+        shared_origin_(std::move(origin)) {
     cleaner_.set_longest_step(longest_step);
     cleaner_.begin_file(path.string() + ": row ");
     open_column("t");
@@ -731,6 +741,10 @@ class Hdf5Walk final : public RowWalk {
     for (std::size_t k = 0; k < columns_.size(); ++k) {
       row_[k] = factors_[k] * columns_[k].at(next_);
     }
+    if (!clock_known_ && std::isfinite(row_[0])) {
+      begin_clock();
+    }
+    row_[0] = (row_[0] - static_cast<double>(origin_) * per_second_) / per_second_;
     ++next_;
     outcome = cleaner_.clean(row_, static_cast<std::size_t>(next_));
     return true;
@@ -746,6 +760,11 @@ class Hdf5Walk final : public RowWalk {
     file.hash = bytes.hash();
     file.header = choice_.header;
     file.notes = choice_.notes;
+    file.time_origin = static_cast<double>(origin_);
+    file.time_zone = origin_ != 0 ? "UTC" : "";
+    if (per_second_ != 1.0) {
+      file.notes.push_back(fmt::format("times are counts of {}, and were read as such", unit_));
+    }
     for (const std::string& column : choice_.header) {
       const bool used = std::ranges::any_of(choice_.found, [&](const auto& found) {
         return found.second.shown() == column &&
@@ -758,6 +777,20 @@ class Hdf5Walk final : public RowWalk {
   }
 
  private:
+  /// Times since 1970, in s or in whole counts, are counted from a whole second.
+  void begin_clock() {
+    clock_known_ = true;
+    for (const auto& [seconds, unit] : count_units) {
+      if (is_since_1970(row_[0] * seconds) && row_[0] == std::floor(row_[0])) {
+        per_second_ = std::round(1.0 / seconds);
+        unit_ = unit;
+      }
+    }
+    if (is_since_1970(row_[0] / per_second_)) {
+      origin_ = common_origin(shared_origin_, static_cast<std::int64_t>(std::floor(row_[0] / per_second_)));
+    }
+  }
+
   void open_column(const std::string& name) {
     const Source& source = choice_.found.at(name);
     columns_.emplace_back(file_.get(), source, fmt::format("{}: {}", path_.string(), source.shown()));
@@ -775,11 +808,17 @@ class Hdf5Walk final : public RowWalk {
   hsize_t next_ = 0;
   std::vector<ColumnReader> columns_;
   std::vector<double> factors_;  // of each
+  TimeOrigin shared_origin_;
+  bool clock_known_ = false;
+  double per_second_ = 1.0;  // counts of the times
+  std::string_view unit_;    // of a count
+  std::int64_t origin_ = 0;  // s
 };
 
 class Hdf5File final : public RowFile {
  public:
-  Hdf5File(std::filesystem::path path, const LogOptions& options) : path_(std::move(path)) {
+  Hdf5File(std::filesystem::path path, const LogOptions& options, TimeOrigin origin)
+      : path_(std::move(path)), origin_(std::move(origin)) {
     if (!options.trust) {
       bag::refuse_holes(path_);
     }
@@ -802,7 +841,7 @@ class Hdf5File final : public RowFile {
   [[nodiscard]] const std::vector<std::string>& columns() const override { return names_; }
   [[nodiscard]] std::unique_ptr<RowWalk> open(const std::vector<std::string>& names, double longest_step,
                                               LogReport* report) override {
-    return std::make_unique<Hdf5Walk>(path_, choice_, names, longest_step, report);
+    return std::make_unique<Hdf5Walk>(path_, choice_, names, longest_step, report, origin_);
   }
 
  private:
@@ -817,6 +856,7 @@ class Hdf5File final : public RowFile {
   }
 
   std::filesystem::path path_;
+  TimeOrigin origin_;
   Choice choice_;
   std::vector<std::string> names_;
 };
@@ -830,8 +870,9 @@ bool is_hdf5(const std::filesystem::path& path) {
          std::string_view(head.data(), head.size()) == signature;
 }
 
-std::unique_ptr<RowFile> hdf5_file(const std::filesystem::path& path, const LogOptions& options) {
-  return std::make_unique<Hdf5File>(path, options);
+std::unique_ptr<RowFile> hdf5_file(const std::filesystem::path& path, const LogOptions& options,
+                                   const TimeOrigin& origin) {
+  return std::make_unique<Hdf5File>(path, options, origin);
 }
 
 }  // namespace wheelwright::logs

@@ -62,7 +62,9 @@ namespace wheelwright::logs {
 /// An HDF5 file as a file of a log. The group is the one whose columns include a time; where there are several, the
 /// first in alphabetical order of paths, and LogFileReport::notes says so. `LogOptions::map` names datasets by their
 /// path ("/drive/w_right", or relative to the group), or members of the compound dataset. Rows are cleaned as in a CSV
-/// file, but nothing is ever text. Throws InputError, naming file and dataset, for what cannot be read.
-[[nodiscard]] std::unique_ptr<RowFile> hdf5_file(const std::filesystem::path& path, const LogOptions& options);
+/// file, but nothing is ever text. Times since 1970, in s or in whole ms, µs or ns, are counted from a whole second, of
+/// `origin` where it has one. Throws InputError, naming file and dataset, for what cannot be read.
+[[nodiscard]] std::unique_ptr<RowFile> hdf5_file(const std::filesystem::path& path, const LogOptions& options,
+                                                 const TimeOrigin& origin);
 
 }  // namespace wheelwright::logs

@@ -2,9 +2,14 @@
 #include "formats/logs/known_logger.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
+
+#include "formats/files/words.hpp"
+#include "formats/logs/recorded_log.hpp"
 
 namespace wheelwright::logs {
 
@@ -36,6 +41,36 @@ std::string known_logger(const std::vector<std::string>& fields) {
             : fmt::format(", current_r: {}, current_l: {}", right_current, left_current));
   }
   return {};
+}
+
+std::string headerless_logger(const std::vector<std::string>& fields, const std::string& file) {
+  constexpr std::size_t stamp = 3;  // s, ns, frame
+  const std::string record =
+      "; `ros2 topic echo --csv` writes such tables: a recording (`ros2 bag record TOPIC`) has the names, too";
+  const std::size_t joints = fields.size() > stamp ? (fields.size() - stamp) / 4 : 0;
+  if (joints < 2 || fields.size() != stamp + 4 * joints) {
+    return record;
+  }
+  std::string names = "t", format = "%d.%09d", values = "$1,$2";
+  for (std::size_t k = 0; k < joints; ++k) {
+    const std::string& joint = fields[stamp + k];
+    const std::string side = files::to_number(joint) ? std::string() : side_of_joint(joint);
+    for (const auto& [quantity, part] : {std::pair("phi_", 1), std::pair("omega_", 2), std::pair("tau_", 3)}) {
+      const std::size_t at = stamp + static_cast<std::size_t>(part) * joints + k;
+      if (side.empty() || !files::to_number(fields[at])) {
+        continue;
+      }
+      names += fmt::format(",{}{}", quantity, side);
+      format += ",%s";
+      values += fmt::format(",${}", at + 1);
+    }
+  }
+  const std::size_t wheels = static_cast<std::size_t>(std::ranges::count(names, ',')) / 3;
+  return wheels != 2 ? record
+                     : fmt::format(
+                           "; it looks like `ros2 topic echo --csv` of a JointState: (echo \"{}\"; awk -F, '{{printf "
+                           "\"{}\\n\", {}}}' {}) > with_names.csv makes a table of it",
+                           names, format, values, file);
 }
 
 }  // namespace wheelwright::logs

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <fstream>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -13,6 +14,7 @@
 
 #include "core/check.hpp"
 #include "core/error.hpp"
+#include "formats/files/bytes.hpp"
 #include "formats/logs/bag.hpp"
 #include "formats/logs/bag_log.hpp"
 #include "formats/logs/csv.hpp"
@@ -43,6 +45,22 @@ std::string state_of(const std::filesystem::path& path) {
   return state;
 }
 
+// A ROS 1 bag in `directory`; empty where there is none.
+std::filesystem::path ros1_bag_in(const std::filesystem::path& directory) {
+  std::error_code none;
+  for (auto entry = std::filesystem::directory_iterator(directory, none);
+       !none && entry != std::filesystem::directory_iterator(); entry.increment(none)) {
+    std::string head(files::ros1_bag_magic.size(), '\0');
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(entry->path(), ignored) &&
+        std::ifstream(entry->path(), std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size())) &&
+        head == files::ros1_bag_magic) {
+      return entry->path();
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& paths, const LogOptions& options) {
@@ -62,11 +80,13 @@ std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& 
     if (is_bag(path)) {
       files.push_back(bag_file(path, options, origin));
     } else if (std::filesystem::is_directory(status)) {
-      throw InputError(path.string() +
-                       ": is a directory: expected a file, or a directory with a recording "
-                       "(metadata.yaml, *.mcap or *.db3)");
+      const std::filesystem::path old = ros1_bag_in(path);
+      throw InputError(old.empty() ? path.string() +
+                                         ": is a directory: expected a file, or a directory with a recording "
+                                         "(metadata.yaml, *.mcap or *.db3)"
+                                   : old.string() + ": " + files::ros1_bag(old));
     } else {
-      files.push_back(is_hdf5(path) ? hdf5_file(path, options) : csv_file(path, options));
+      files.push_back(is_hdf5(path) ? hdf5_file(path, options, origin) : csv_file(path, options, origin));
     }
   }
   auto log = std::make_unique<RowLog>(std::move(files), RowLogOptions{options.block_rows, options.min_rows});

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <cstdint>
 #include <initializer_list>
 #include <map>
 #include <vector>
@@ -12,6 +14,7 @@
 #include "core/error.hpp"
 #include "formats/files/words.hpp"
 #include "formats/logs/known_logger.hpp"
+#include "formats/logs/wall_clock.hpp"
 
 namespace wheelwright::logs {
 namespace {
@@ -25,7 +28,7 @@ struct Row {
 /// A name that ends in '@' is two columns, _r and _l.
 constexpr Row table[] = {
     {"t", "time", "s", 1e11,
-     "time stamp timestamp time_stamp sec secs seconds time_s time_sec t_s t_sec elapsed elapsed_s elapsed_time "
+     "time stamp timestamp time_stamp %time sec secs seconds time_s time_sec t_s t_sec elapsed elapsed_s elapsed_time "
      "header_stamp"},
     {"omega_@", "speed of the @ wheel", "rad/s", 1e4,
      "@_omega w_@ w@ omega@ omega_wheel_@ wheel_@_omega wheel_omega_@ wheel_@_vel wheel_@_velocity wheel_@_speed "
@@ -271,6 +274,12 @@ std::string plain_name(std::string_view text) {
   return out;
 }
 
+std::string clock_time(const LogFileReport& file, double t) {
+  return is_since_1970(file.time_origin) && std::isfinite(t)
+             ? moment_text(static_cast<std::int64_t>(file.time_origin), t, file.time_zone)
+             : std::string();
+}
+
 std::vector<core::ColumnError> interpolation_errors(const LogReport& report) {
   std::vector<core::ColumnError> errors;
   for (const LogFileReport& file : report.files) {
@@ -302,7 +311,9 @@ std::vector<std::string> sentences(const LogReport& report) {
   say(report.angle_wraps, "jump", "jumps", "of a wheel angle by a whole turn undone: it was wrapped at 2π");
   for (const LogFileReport& file : report.files) {
     if (file.time_origin != 0.0) {
-      out.push_back(fmt::format("{}: times are counted from {:.0f} s of its own clock", file.path, file.time_origin));
+      const std::string clock = clock_time(file, 0.0);
+      out.push_back(fmt::format("{}: times are counted from {:.0f} s of its own clock{}{}", file.path, file.time_origin,
+                                clock.empty() ? "" : ", ", clock));
     }
     for (const Interpolation& of : file.interpolated) {
       out.push_back(fmt::format("{}: {} was interpolated between the samples of {}, with an error of at most {:.3g}{}",

@@ -74,9 +74,15 @@ struct LogFileReport {
   std::size_t segments = 0;          ///< segments that begin in this file
   double seconds = 0.0;              ///< sum over the segments of last time − first time, s
   double time_origin = 0.0;          ///< s, of the file's own clock: what its times are counted from
+  std::string time_zone;             ///< "UTC" where time_origin counts from 1970 there; empty where it is not told
+  std::string time_remedy;           ///< the argument that makes s of its times where they look like another unit
   std::vector<Interpolation> interpolated;
   std::vector<std::string> notes;  ///< what else was decided or lost, one sentence each
 };
+
+/// The moment `t` (s of log time) by the clock of `file`, "2026-11-29 08:40:00.123 UTC"; empty where its times are not
+/// counted from a date.
+[[nodiscard]] std::string clock_time(const LogFileReport& file, double t);
 
 /// A whole log.
 struct LogReport {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -22,6 +23,18 @@ namespace {
 constexpr double turn = 2.0 * std::numbers::pi;
 
 }  // namespace
+
+std::int64_t common_origin(const TimeOrigin& origin, std::int64_t second) {
+  constexpr std::int64_t ns = 1'000'000'000, ten_years = 315'576'000;
+  if (!origin) {
+    return second;
+  }
+  if (!origin->has_value()) {
+    *origin = second * ns;
+  }
+  const std::int64_t other = origin->value() / ns;
+  return std::abs(other - second) < ten_years ? other : second;
+}
 
 double WheelAngle::follow(double time, double angle, bool predict) {
   constexpr double slack = 1e-3;
@@ -321,6 +334,12 @@ void RowLog::judge() const {
       message += "; " + sentence;
     }
     throw InputError(message);
+  }
+  if (3 * report_.duplicates.count > 2 * report_.rows_read) {
+    throw InputError(fmt::format(
+        "{}: {} of {} rows have the time of the row before: expected times with more decimals, as fine as the rows "
+        "follow each other (first at {})",
+        where, report_.duplicates.count, report_.rows_read, report_.duplicates.first));
   }
   if (report_.rows > 1 && !(report_.median_step > 0.0) && report_.resets.count > 0) {
     throw InputError(where + ": column t never increases: expected times in seconds, one row after the other");

@@ -9,6 +9,7 @@
 #include <deque>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,6 +19,13 @@
 #include "formats/logs/recorded_log.hpp"
 
 namespace wheelwright::logs {
+
+/// Origin of the times of all files of a log, ns: set by the first that has a wall clock.
+using TimeOrigin = std::shared_ptr<std::optional<std::int64_t>>;
+
+/// The s from which times are counted that begin at `second`: those of `origin` where it is set and less than ten years
+/// away, else `second`, which sets an origin that is not. `origin` may be null.
+[[nodiscard]] std::int64_t common_origin(const TimeOrigin& origin, std::int64_t second);
 
 /// Outcome of a row.
 enum class RowOutcome {

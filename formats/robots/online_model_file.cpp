@@ -352,7 +352,8 @@ std::optional<detector::KinematicModel> kinematic_from_json(const JsonPlace& pla
 OnlineModel model_from_json(const Json& json, const std::string& file) {
   const JsonPlace root = model_root(json, file);
   if (!root.has("detector")) {
-    throw InputError(file + ": holds no model: " + root.at("message").text());
+    const std::string why = root.at("message").text();
+    throw InputError(file + (why.starts_with("no model: ") ? ": holds " : ": holds no model: ") + why);
   }
   OnlineModel model;
   model.robot = robot_from_json(root.at("robot").value(), root.at("robot").where());

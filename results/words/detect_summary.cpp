@@ -117,10 +117,12 @@ std::string summary(const Detection& d, const OnlineModel& model) {
   return text;
 }
 
-std::string summary(const std::vector<detector::Incident>& incidents) {
+std::string summary(const std::vector<detector::Incident>& incidents, const std::function<std::string(double)>& clock) {
   std::string text;
   for (std::size_t k = 0; k < incidents.size(); ++k) {
-    text += fmt::format("incident {}: {}\n", k + 1, incident_sentence(incidents[k]));
+    const std::string moment = clock ? clock(incidents[k].start) : std::string();
+    text += fmt::format("incident {}{}: {}\n", k + 1, moment.empty() ? "" : fmt::format(" ({})", moment),
+                        incident_sentence(incidents[k]));
   }
   return text;
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,8 +27,10 @@ namespace wheelwright::words {
 /// Summary of the detector at a stated risk for a terminal; empty where the model says nothing at a risk.
 [[nodiscard]] std::string summary(const commission::RiskWatch& watch, const OnlineModel& model);
 
-/// The incidents for a terminal, a line each; empty where there are none.
-[[nodiscard]] std::string summary(const std::vector<detector::Incident>& incidents);
+/// The incidents for a terminal, a line each; empty where there are none. `clock` makes the moment by a wall clock of a
+/// time of the log (s), empty where there is none.
+[[nodiscard]] std::string summary(const std::vector<detector::Incident>& incidents,
+                                  const std::function<std::string(double)>& clock = {});
 
 /// Why a detector of `model` decided at no instant of `rows` rows with the median step `step` (s), or at instants that
 /// tell nothing (commission::hardly_goes_on()), with what to do about it.

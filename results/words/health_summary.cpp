@@ -2,20 +2,26 @@
 #include "results/words/health_summary.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
 namespace wheelwright::words {
 namespace {
 
-std::string stretches(const doctor::LogFinding& finding) {
+// `t` to the hundredth of a second, or to five digits where these are more.
+std::string seconds(double t) { return std::abs(t) < 1e3 ? fmt::format("{:.5g}", t) : fmt::format("{:.2f}", t); }
+
+std::string stretches(const doctor::LogFinding& finding, const std::function<std::string(double)>& clock) {
   if (finding.when.empty()) {
     return {};
   }
   constexpr std::size_t kShown = 4;
   std::string text = "at t = ";
   for (std::size_t k = 0; k < std::min(kShown, finding.when.size()); ++k) {
-    text += fmt::format("{}{:.5g} to {:.5g} s", k > 0 ? ", " : "", finding.when[k].lower, finding.when[k].upper);
+    const std::string moment = clock ? clock(finding.when[k].lower) : std::string();
+    text += fmt::format("{}{} to {} s{}", k > 0 ? ", " : "", seconds(finding.when[k].lower),
+                        seconds(finding.when[k].upper), moment.empty() ? "" : fmt::format(" ({})", moment));
   }
   return finding.stretches > kShown ? text + fmt::format(" and {} more", finding.stretches - kShown) : text;
 }
@@ -40,14 +46,15 @@ std::string indented(const std::string& text, const std::string& indent) {
 
 }  // namespace
 
-std::string summary(const doctor::LogHealth& health, bool all) {
+std::string summary(const doctor::LogHealth& health, bool all, const std::function<std::string(double)>& clock) {
   std::string text;
   for (const doctor::LogFinding& finding : health.findings) {
     if (finding.severity == doctor::FindingSeverity::fine && !all) {
       continue;
     }
     text += fmt::format("{}: {}\n", doctor::to_string(finding.severity), finding.id) +
-            indented(finding.sentence, "  ") + indented(stretches(finding), "  ") + indented(finding.next, "  → ");
+            indented(finding.sentence, "  ") + indented(stretches(finding, clock), "  ") +
+            indented(finding.next, "  → ");
   }
   const std::size_t fine = health.count(doctor::FindingSeverity::fine);
   if (!all && fine > 0) {

@@ -58,6 +58,22 @@ TEST_F(Convert, SaysWhatItRepaired) {
   EXPECT_EQ(json.at("rows_read"), 400);
 }
 
+TEST_F(Convert, ReadsColumnsByTheRobotFileAndItsOwnNamesWithTheSameFile) {
+  std::vector<std::string> lines = healthy_lines();
+  lines.resize(400);
+  put_lines("named.csv", lines);
+  core::replace_all(lines[0], "omega_r", "right speed");
+  put_lines("drive.csv", lines);
+  put("mapped.yaml", bytes(path("robot.yaml")) + "columns: {omega_r: right speed}\n");
+  const Outcome done = run("convert drive.csv one.csv --robot mapped.yaml");
+  EXPECT_EQ(done.code, 0) << done.err;
+  const Outcome again = run("convert one.csv two.csv --robot mapped.yaml");
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("omega_r was read by its own name"));
+  EXPECT_EQ(bytes(path("two.csv")), bytes(path("one.csv")));
+  EXPECT_EQ(run("doctor one.csv --robot mapped.yaml").err, "");
+}
+
 TEST_F(Convert, ReplacesNothingUnasked) {
   put("drive.csv", "mine");
   const Outcome refused = run("convert " + shipped() + " drive.csv");

@@ -26,10 +26,29 @@ std::vector<double> numbers_of(const std::string& line) {
   return numbers;
 }
 
+/// Whether the file has numbers alone, with points, between commas: what numbers_of() reads as it is meant.
+bool is_plain(const std::filesystem::path& path) {
+  files::LineReader in(files::open_bytes(path), path.string());
+  std::string_view line;
+  for (std::size_t rows = 0; in.next(line);) {
+    if (!logs::is_csv_content(line)) {
+      continue;
+    }
+    if (line.find_first_of(";\t\":") != std::string_view::npos ||
+        (rows == 1 && line.find_first_of("0123456789") == std::string_view::npos)) {
+      return false;
+    }
+    ++rows;
+  }
+  return true;
+}
+
 /// Every row is one of a line, in their order, and the stream's reader has the same.
 void require_as_written(const std::filesystem::path& path, const logs::RecordedLog& log, const LogTable& table) {
   const logs::LogFileReport& report = log.report().files.front();
-  if (!report.interpolated.empty()) {
+  const bool converted =
+      std::ranges::any_of(report.notes, [](const std::string& note) { return note.find(" times ") != note.npos; });
+  if (!report.interpolated.empty() || converted || !is_plain(path)) {
     return;
   }
   const bool seconds = report.time_origin == 0.0;
@@ -46,7 +65,7 @@ void require_as_written(const std::filesystem::path& path, const logs::RecordedL
     if (!parser.parse(line, row)) {
       continue;
     }
-    fuzz::require(row.t[0] == table.t[k]);
+    fuzz::require(!seconds || row.t[0] == table.t[k]);
     segments += row.segment_starts.size();
     std::string text(line);
     std::ranges::replace(text, '\0', '?');

@@ -439,7 +439,6 @@ TEST_F(CsvError, Headers) {
   EXPECT_THAT(error("0.1,2.5,3"), AllOf(HasSubstr("log.csv:1"), HasSubstr("expected a header line")));
   EXPECT_THAT(error("tme,omega_r,tau_r"), AllOf(HasSubstr("log.csv:1: no column for t (time, s)"),
                                                 HasSubstr("tme, omega_r, tau_r"), HasSubstr("did you mean 'tme'?")));
-  EXPECT_THAT(error("Time [ms],omega_r,tau_r"), HasSubstr("no column for t (time, s)"));
   EXPECT_THAT(error("t,w_r,wheel_right_vel"),
               AllOf(HasSubstr("'w_r' and 'wheel_right_vel' both mean omega_r"), HasSubstr("--map omega_r=COLUMN")));
   EXPECT_THAT(error("t,omega_r,omega_r"), HasSubstr("both mean omega_r"));
@@ -472,7 +471,7 @@ TEST_F(CsvError, Rows) {
                 "at most 10000"));
   EXPECT_THAT(error("1.7e18,1,2"), HasSubstr("column 't': '1.7e18': expected time in s"));
   EXPECT_THAT(error(std::string("31,\0\0\0,2", 8)), HasSubstr("expected a number"));
-  EXPECT_THAT(input_error([&] { read("t;omega_r\n0;0,5\n1;0,7\n"); }),
+  EXPECT_THAT(input_error([&] { read("t;omega_r\n0.5;0,5\n1;0,7\n"); }),
               HasSubstr("'0,5': expected a number with a decimal point"));
 }
 

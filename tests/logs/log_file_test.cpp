@@ -120,7 +120,7 @@ TEST_F(LogFile, KeptRowsAreThoseOfTheFile) {
     const auto open = [&](std::size_t kept_bytes) {
       std::vector<std::unique_ptr<RowFile>> files;
       for (int k = 0; k < 2; ++k) {
-        files.push_back(name == "log.csv" ? csv_file(path(name), {}) : hdf5_file(path(name), {}));
+        files.push_back(name == "log.csv" ? csv_file(path(name), {}, {}) : hdf5_file(path(name), {}, {}));
       }
       return RowLog(std::move(files), {.block_rows = 300, .kept_bytes = kept_bytes});
     };
