@@ -35,7 +35,8 @@ doctor::ReaderCounts reader_counts(const logs::LogReport& report) {
           .duplicates = report.duplicates.count,
           .truncated = report.truncated.count,
           .jumps = report.jumps.count,
-          .unwrapped = report.angle_wraps.count};
+          .unwrapped = report.angle_wraps.count,
+          .time_remedy = report.files.empty() ? std::string() : report.files.front().time_remedy};
 }
 
 doctor::LogHealth examine_first(logs::RecordedLog& log, const std::optional<Robot>& robot, std::size_t most,

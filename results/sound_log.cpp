@@ -38,7 +38,7 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
   }
   if (!wrong.empty()) {
     throw InputError(
-        fmt::format("{}: the log does not fit the robot file:{}\n`wheelwright doctor` says more; "
+        fmt::format("{}: the log does not fit the robot file:{}\n  `wheelwright doctor` says more; "
                     "--despite {} goes on all the same",
                     paths.front().string(), wrong, fmt::join(names, " --despite ")));
   }

@@ -318,6 +318,8 @@ void check_angles(const HealthView& view, std::vector<LogFinding>& out) {
       continue;
     }
     const std::string unit = ratio > 0.0 ? unit_for_ratio(1.0 / ratio, true) : "";
+    // Angles come 60 times as fast by a clock in min; in degrees they come 57 times as fast.
+    const bool minutes = std::abs(ratio / 60.0 - 1.0) < 0.02;
     const bool unlike = std::abs(fits) < 0.9;
     const bool wrong = unlike || std::abs(ratio - 1.0) > 0.1;
     out.push_back(about_units(
@@ -325,9 +327,12 @@ void check_angles(const HealthView& view, std::vector<LogFinding>& out) {
         unlike ? fmt::format("{} and the integral of {} have a correlation of only {:.2f}.", j.angle_name, j.speed_name,
                              fits)
                : fmt::format("{} changes by {:.4g} times the integral of {}.{}", j.angle_name, ratio, j.speed_name,
-                             unit.empty() ? "" : fmt::format(" The speed looks like {}.", unit)),
-        unlike ? "Columns of different wheels, or of different clocks: check their names (--map)."
-               : "One of them has another unit, sign or gear ratio: leave out the wrong one or convert it.",
+                             minutes        ? " The times look like min."
+                             : unit.empty() ? ""
+                                            : fmt::format(" The speed looks like {}.", unit)),
+        unlike    ? "Columns of different wheels, or of different clocks: check their names (--map)."
+        : minutes ? "Convert the column t to seconds: --map t=\"COLUMN*60\" does so."
+                  : "One of them has another unit, sign or gear ratio: leave out the wrong one or convert it.",
         {j.angle_name, j.speed_name}, ratio));
   }
 }

@@ -64,23 +64,50 @@ double decimal_quantum(const std::vector<double>& steps, double median) {
   return 0.0;
 }
 
-std::string time_unit(double step) {
-  for (const auto& [factor, unit] : {std::pair{1e-3, "ms"}, std::pair{1e-6, "µs"}, std::pair{1e-9, "ns"}}) {
-    if (step * factor >= 2e-4 && step * factor < 0.3) {
-      return unit;
+constexpr double kShortestStep = 2.5e-4;      // s, of a robot on wheels: a driver logs it at 4 kHz at most
+constexpr double kShortestAxisStep = 2e-5;    // s, of a single axis, which a test stand may log much faster
+constexpr double kSerialDays[] = {3e4, 6e4};  // days since 1900, from 1982 on
+
+// Units that `step` of them, the first at `first`, may be of, each with the rate that it makes; empty where s are
+// plausible. Of units shorter than s the first, of longer ones all that make a robot's log of it: nothing but the rate
+// tells min from h and days.
+std::vector<std::string> time_units(double step, double first, double shortest) {
+  if (step >= 1.0) {
+    for (const auto& [factor, unit] : {std::pair{1e-3, "ms"}, std::pair{1e-6, "µs"}, std::pair{1e-9, "ns"}}) {
+      if (step * factor >= 2e-4 && step * factor < 0.3) {
+        return {unit};
+      }
+    }
+    return {};
+  }
+  std::vector<std::string> units;
+  const bool serial = first > kSerialDays[0] && first < kSerialDays[1];
+  if (step > 0.0 && step < shortest) {
+    for (const auto& [factor, unit] : {std::pair{60.0, "min"}, std::pair{3600.0, "h"}, std::pair{86400.0, "days"}}) {
+      if (step * factor >= 1e-3 && step * factor <= 0.2 && (!serial || factor > 3600.0)) {
+        units.push_back(fmt::format("{} ({:.3g} Hz)", unit, 1.0 / (step * factor)));
+      }
+    }
+    if (units.empty()) {
+      units.emplace_back("another unit");
     }
   }
-  return {};
+  return units;
 }
 
-void check_rate(const HealthView& view, double seconds, std::vector<LogFinding>& out) {
+void check_rate(const HealthView& view, const ReaderCounts& reader, double seconds, std::vector<LogFinding>& out) {
   const double rate = view.step > 0.0 ? 1.0 / view.step : 0.0;
-  const std::string unit = view.step >= 1.0 ? time_unit(view.step) : "";
-  if (!unit.empty()) {
-    out.push_back(
-        about_time("units.time", FindingSeverity::fatal,
-                   fmt::format("The median step is {:.4g} s: the time stamps look like {}, not s.", view.step, unit),
-                   "Convert the column t to seconds.", view.step, "s"));
+  const std::vector<std::string> units =
+      time_units(view.step, view.log->t.empty() ? 0.0 : view.log->t.front(),
+                 model::on_two_wheels(view.robot) ? kShortestStep : kShortestAxisStep);
+  if (!units.empty()) {
+    out.push_back(about_time("units.time", FindingSeverity::fatal,
+                             fmt::format("The median step is {:.4g} s: the time stamps look like {}, not s.", view.step,
+                                         core::listed(units, " or ")),
+                             reader.time_remedy.empty()
+                                 ? "Convert the column t to seconds: --map t=\"COLUMN*FACTOR\" does so."
+                                 : fmt::format("Make seconds of the column t: {} does so.", reader.time_remedy),
+                             view.step, "s"));
     out.back().topic = FindingTopic::units;
     return;
   }
@@ -232,7 +259,7 @@ void check_time(const HealthView& view, const ReaderCounts& reader, std::vector<
   for (const auto& [first, last] : view.segments) {
     seconds += last > first ? view.log->t[last - 1] - view.log->t[first] : 0.0;
   }
-  check_rate(view, seconds, findings);
+  check_rate(view, reader, seconds, findings);
   check_length(view, seconds, findings);
   check_segments(view, seconds, findings);
   check_reader(reader, findings);
@@ -395,7 +422,8 @@ LogHealth examine(const LogTable& log, const std::optional<Robot>& robot, const 
   check_columns(view, health.findings);
   check_time(view, reader, health.findings);
   bool reaches_bounds = false;
-  if (log.rows() > 0) {
+  // Speeds and delays by a clock in another unit would be nonsense.
+  if (log.rows() > 0 && health.find("units.time") == nullptr) {
     std::vector<LogFinding> of_motion;
     core::both(
         threads,

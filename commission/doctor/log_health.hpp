@@ -75,6 +75,7 @@ struct ReaderCounts {
   std::size_t truncated = 0;   ///< last lines cut off
   std::size_t jumps = 0;       ///< segments that begin where a wheel angle jumps as no wheel turns
   std::size_t unwrapped = 0;   ///< jumps of a wheel angle by a turn that were undone
+  std::string time_remedy{};   ///< the argument that makes s of the times where they look like another unit
 };
 
 /// The examination.

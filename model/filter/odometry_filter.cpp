@@ -12,6 +12,7 @@
 namespace wheelwright::filter {
 namespace {
 
+constexpr double kMostSteps = 1e5;     // of a window: at 500 Hz 200 s
 constexpr double kSpareSamples = 2.0;  // the ring holds this many times the samples that a window should have
 // Of a few operations on numbers that are themselves rounded, as a multiple of their size.
 constexpr double kRounding = 16.0 * std::numeric_limits<double>::epsilon();
@@ -20,6 +21,7 @@ std::size_t ring_size(double window, double step) {
   check::positive(window, "window");
   check::positive(step, "nominal step");
   check::that(window >= 2.0 * step, "window", "at least two sampling steps");
+  check::that(window <= kMostSteps * step, "window", "at most 100,000 sampling steps; are the times of the log in s?");
   return static_cast<std::size_t>(std::ceil(kSpareSamples * window / step)) + 2;
 }
 

@@ -29,6 +29,41 @@ TEST_F(Doctor, FindsTheShippedLogFitToBeCommissioned) {
   EXPECT_THAT(alone.out, HasSubstr("Set effort.hold to"));
 }
 
+TEST_F(Doctor, PlacesOfAWallClockAreSecondsOfTheLogAndMoments) {
+  std::vector<std::string> lines = healthy_lines(), kept = {lines[0]};
+  for (std::size_t k = 1; k < 3000; ++k) {
+    const std::size_t comma = lines[k].find(',');
+    if (k % 1000 < 500 || k % 1000 > 502) {
+      kept.push_back(
+          fmt::format("{:.6f}{}", 1'795'941'600.0 + std::stod(lines[k].substr(0, comma)), lines[k].substr(comma)));
+    }
+  }
+  put_lines("drive.csv", kept);
+  const Outcome told = run("doctor drive.csv --robot robot.yaml");
+  EXPECT_THAT(told.out, HasSubstr("times are counted from 1795941600 s of its own clock, 2026-11-29 08:40:00.000 UTC"));
+  EXPECT_THAT(told.out, HasSubstr("at t = 4.98 to 5.02 s (2026-11-29 08:40:04.980 UTC)"));
+  EXPECT_THAT(told.out, Not(HasSubstr("e+09")));
+}
+
+TEST_F(Doctor, DaysAreRefusedByEveryCommandWithWhatMakesSecondsOfThem) {
+  std::vector<std::string> lines = healthy_lines();
+  lines.resize(3000);
+  for (std::size_t k = 1; k < lines.size(); ++k) {
+    const std::size_t comma = lines[k].find(',');
+    lines[k] =
+        fmt::format("{:.11f}{}", 46110.0 + std::stod(lines[k].substr(0, comma)) / 86400.0, lines[k].substr(comma));
+  }
+  put_lines("drive.csv", lines);
+  for (const char* command : {"doctor", "commission", "identify"}) {
+    const Outcome told =
+        run(fmt::format("{} drive.csv --robot robot.yaml", command), "/dev/null", "ulimit -v 2000000;");
+    EXPECT_NE(told.code, 0);
+    EXPECT_THAT(told.out + told.err, HasSubstr("look like days")) << command;
+    EXPECT_THAT(told.out + told.err, HasSubstr("--map t=\"t*86400\"")) << command;
+    EXPECT_THAT(told.err, Not(HasSubstr("\\x0A"))) << command;
+  }
+}
+
 TEST_F(Doctor, WritesWhatItFound) {
   const Outcome done = run("doctor " + shipped() + " --robot robot.yaml --out examined --quiet");
   ASSERT_EQ(done.code, 0) << done.err;

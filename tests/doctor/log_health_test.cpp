@@ -183,6 +183,44 @@ TEST_F(LogHealthTest, TimeInMilliseconds) {
   expect("units.time", kFatal);
 }
 
+// Robots are logged at 10 to 500 Hz: no unit but s makes such a log of them, and the right one is among those named.
+TEST_F(LogHealthTest, TimesInOtherUnitsAreRefusedAtEveryRate) {
+  struct Unit {
+    const char* name;
+    double seconds, slowest;
+  };
+  for (const Unit& unit : {Unit{"days", 86400.0, 10.0}, Unit{"h", 3600.0, 10.0}, Unit{"min", 60.0, 100.0}}) {
+    for (const double rate : {10.0, 25.0, 50.0, 100.0, 200.0, 500.0}) {
+      for (std::size_t k = 0; k < log.rows(); ++k) {
+        log.t[k] = static_cast<double>(k) / rate / unit.seconds;
+      }
+      const LogHealth health = examine(log, robot);
+      const LogFinding* found = health.find("units.time");
+      EXPECT_EQ(found != nullptr, rate >= unit.slowest) << unit.name << " at " << rate;
+      if (found != nullptr) {
+        EXPECT_TRUE(found->is_refusal());
+        EXPECT_THAT(found->sentence, ::testing::HasSubstr(unit.name)) << rate;
+      }
+    }
+  }
+  for (const double rate : {10.0, 100.0, 500.0, 2000.0}) {
+    for (std::size_t k = 0; k < log.rows(); ++k) {
+      log.t[k] = 1.7e4 + static_cast<double>(k) / rate;
+    }
+    EXPECT_EQ(examine(log, robot).find("units.time"), nullptr) << rate;
+  }
+}
+
+TEST_F(LogHealthTest, WhatMakesSecondsOfTheTimesIsPasted) {
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    log.t[k] = 46110.0 + 0.01 * static_cast<double>(k) / 86400.0;
+  }
+  const LogHealth health = examine(log, robot, {.time_remedy = "--map t=\"t*86400\""});
+  ASSERT_NE(health.find("units.time"), nullptr);
+  EXPECT_THAT(health.find("units.time")->sentence, ::testing::HasSubstr("look like days"));
+  EXPECT_THAT(health.find("units.time")->next, ::testing::HasSubstr("--map t=\"t*86400\""));
+}
+
 TEST_F(LogHealthTest, AShortLogIsShort) {
   log = core::slice(log, 0, 700);
   expect("time.length", kWarning);
