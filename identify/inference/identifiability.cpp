@@ -6,11 +6,13 @@
 #include <limits>
 #include <numeric>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "core/check.hpp"
 #include "core/linear_algebra.hpp"
+#include "core/statistics.hpp"
 #include "core/words.hpp"
 
 namespace wheelwright::inference {
@@ -349,6 +351,31 @@ constexpr double kConfounded = 1e-5;      // part of a scaled unit vector in the
 
 }  // namespace
 
+namespace {
+
+// Whether the time of no block begins before that of the one before it has ended.
+bool on_one_clock(const std::vector<identify::MomentBlock>& blocks) {
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    if (blocks[b].last < blocks[b].first || (b > 0 && blocks[b].first < blocks[b - 1].last)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// Median of the blocks' steps, s; 0 where there is none.
+double step_of(const std::vector<identify::MomentBlock>& blocks) {
+  std::vector<double> steps;
+  for (const identify::MomentBlock& block : blocks) {
+    if (block.instants > 1 && block.last > block.first) {
+      steps.push_back((block.last - block.first) / static_cast<double>(block.instants - 1));
+    }
+  }
+  return steps.empty() ? 0.0 : core::median(std::move(steps));
+}
+
+}  // namespace
+
 InformationOverTime information_over_time(const identify::RegressionMoments& moments,
                                           const InformationOptions& options) {
   check::non_negative(options.seconds, "length of a window");
@@ -363,13 +390,27 @@ InformationOverTime information_over_time(const identify::RegressionMoments& mom
   if (blocks.empty()) {
     return result;
   }
-  const double seconds =
-      options.seconds > 0.0 ? options.seconds : (blocks.back().last - blocks.front().first) / kWindows;
+  const bool one_clock = on_one_clock(blocks);
+  const double step = step_of(blocks);
+  const auto length = [&](const identify::MomentBlock& of) {
+    return one_clock ? of.last - of.first : step * static_cast<double>(of.instants);
+  };
+  for (const identify::MomentBlock& block : blocks) {
+    result.seconds += one_clock ? 0.0 : length(block);
+  }
+  result.seconds = one_clock ? blocks.back().last - blocks.front().first : result.seconds;
+  const double seconds = options.seconds > 0.0 ? options.seconds : result.seconds / kWindows;
   std::vector<Eigen::MatrixXd> grams;
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const Eigen::MatrixXd YY = moments.block(b, w).YY;
     // A block belongs where its middle is.
-    if (result.windows.empty() || 0.5 * (blocks[b].first + blocks[b].last) >= result.windows.back().first + seconds) {
+    const auto is_full = [&] {
+      const identify::MomentBlock& window = result.windows.back();
+      return one_clock ? 0.5 * (blocks[b].first + blocks[b].last) >= window.first + seconds
+                       : blocks[b].first < window.last || blocks[b].last < blocks[b].first ||
+                             window.last < window.first || length(window) + 0.5 * length(blocks[b]) >= seconds;
+    };
+    if (result.windows.empty() || is_full()) {
       result.windows.push_back(blocks[b]);
       grams.push_back(YY);
     } else {
@@ -421,12 +462,14 @@ InformationOverTime information_over_time(const identify::RegressionMoments& mom
     std::sort(info.shortest.begin(), info.shortest.end());
     for (std::size_t k = 0; k < info.shortest.size(); ++k) {
       const identify::MomentBlock& window = result.windows[info.shortest[k]];
-      if (k > 0 && info.shortest[k] == info.shortest[k - 1] + 1) {
+      const bool follows = k > 0 && info.shortest[k] == info.shortest[k - 1] + 1 && !info.spans.empty() &&
+                           window.first >= info.spans.back().second;
+      if (follows && window.last >= window.first) {
         info.spans.back().second = window.last;
-      } else {
+      } else if (window.last >= window.first) {
         info.spans.emplace_back(window.first, window.last);
       }
-      info.seconds += window.last - window.first;
+      info.seconds += length(window);
     }
   }
   return result;

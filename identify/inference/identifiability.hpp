@@ -143,13 +143,15 @@ struct ParameterInformation {
 /// Information over time.
 struct InformationOverTime {
   std::vector<identify::MomentBlock> windows;
+  double seconds = 0.0;  ///< from the first instant to the last; where time goes back, of all instants together
   std::vector<ParameterInformation> parameters;  ///< p
 };
 
 /// Partial information about θ_j is what its column holds beyond the other columns over the whole log, I_j = min over d
 /// with d_j = 1 of dᵀ(Σ w²YᵀY)d: the inverse of θ̂_j's variance under white errors. With its minimising d the share of
 /// window k is dᵀ(Σ_{in k} w²YᵀY)d / I_j: at least zero, and all of them add up to one. Windows are made of whole
-/// blocks of the moments.
+/// blocks of the moments, none across an instant at which time goes back; in such a log lengths are those of the
+/// instants at the median step.
 [[nodiscard]] InformationOverTime information_over_time(const identify::RegressionMoments& moments,
                                                         const InformationOptions& options = {});
 

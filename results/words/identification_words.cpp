@@ -194,7 +194,6 @@ std::string information_sentence(const Identification& r) {
   if (r.information.windows.empty()) {
     return {};
   }
-  const double log = r.information.windows.back().last - r.information.windows.front().first;
   std::size_t least = r.information.parameters.size();
   for (std::size_t j = 0; j < r.information.parameters.size(); ++j) {
     const inference::ParameterInformation& p = r.information.parameters[j];
@@ -209,7 +208,7 @@ std::string information_sentence(const Identification& r) {
   return fmt::format(
       "Of the {:.0f} s, {:.2g} s carry 80 % of the information on {}, the parameter that the fewest "
       "seconds tell.",
-      log, r.information.parameters[least].seconds, spoken(shown[least].name));
+      r.information.seconds, r.information.parameters[least].seconds, spoken(shown[least].name));
 }
 
 std::string quantity(const inference::KinematicQuantity& q) {

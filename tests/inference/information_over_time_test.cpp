@@ -94,6 +94,27 @@ TEST(InformationOverTime, TakesTheFewestWindows) {
   EXPECT_NEAR(p.spans[0].first, 2.0, 1e-9);
 }
 
+// Four drives whose clocks all begin at 0: lengths are those of the drives, and no stretch runs backwards.
+TEST(InformationOverTime, LengthsAreThoseOfDrivesThatBeginAnew) {
+  Random random(4);
+  identify::RegressionMoments moments(1, 2);
+  double seconds = 0.0;
+  for (const Eigen::Index rows : {300, 250, 100, 100}) {
+    const Eigen::MatrixXd Y = random.matrix(rows, 2);
+    moments.add(block_of(Y, Eigen::VectorXd::Zero(rows), 1));
+    seconds += 0.01 * static_cast<double>(rows);
+  }
+  const InformationOverTime info = information_over_time(moments);
+  EXPECT_NEAR(info.seconds, seconds, 0.1);
+  for (const ParameterInformation& p : info.parameters) {
+    EXPECT_GT(p.seconds, 0.5 * seconds);
+    EXPECT_LE(p.seconds, info.seconds + 1e-9);
+    for (const auto& [from, to] : p.spans) {
+      EXPECT_LE(from, to);
+    }
+  }
+}
+
 TEST(InformationOverTime, IsNoneWhereParametersAreConfounded) {
   Random random(3);
   Eigen::MatrixXd Y = random.matrix(500, 3);
