@@ -22,6 +22,7 @@
 #include "app/sound_log.hpp"
 #include "commission/doctor/log_health.hpp"
 #include "core/error.hpp"
+#include "core/words.hpp"
 #include "formats/logs/bag.hpp"
 #include "formats/robots/controller_file.hpp"
 #include "formats/robots/online_model_file.hpp"
@@ -420,7 +421,9 @@ int run(const Arguments& given) {
   } else {
     const Json model = files::read_json(out / "commission" / "model.json");
     page.model = model.contains("detector");
-    verdict = fmt::format("{}: {}", page.model ? "A model" : "No model", model.at("message").get<std::string>());
+    const std::string message = model.at("message").get<std::string>();
+    verdict = message.starts_with("no model: ") ? core::capital(message)
+                                                : fmt::format("{}: {}", page.model ? "A model" : "No model", message);
     if (page.model) {
       if (const std::string least = smallest_change(model, robot); !least.empty()) {
         verdict += "; " + least;

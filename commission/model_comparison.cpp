@@ -97,16 +97,18 @@ Interval change_in(const Polytope& set, std::size_t j, std::size_t other) {
 
 Interval intersection(Interval x, Interval y) { return {std::max(x.lower, y.lower), std::min(x.upper, y.upper)}; }
 
-// θ_L of the sets as the physical quantities behind them.
-void in_physical_words(SetComparison& sets, const Model& model, const std::vector<PhysicalScale>& scales) {
-  for (std::size_t j = 0; j < model.p(); ++j) {
+// The parameters of the sets, `entries` of θ_L, as the physical quantities behind them.
+void in_physical_words(SetComparison& sets, const Model& model, const std::vector<PhysicalScale>& all_scales,
+                       const std::vector<std::size_t>& entries) {
+  for (std::size_t j = 0; j < entries.size(); ++j) {
+    const PhysicalScale& scale = all_scales[entries[j]];
     const auto at = [&](Interval theta, bool moved) {
-      const Interval scaled = core::point(scales[j].scale) * theta;
-      return moved ? scaled - core::point(scales[j].offset) : scaled;
+      const Interval scaled = core::point(scale.scale) * theta;
+      return moved ? scaled - core::point(scale.offset) : scaled;
     };
     ParameterChange& parameter = sets.parameters[j];
-    parameter.quantity = model.parameters[j].physical;
-    parameter.unit = model.parameters[j].physical_unit;
+    parameter.quantity = model.parameters[entries[j]].physical;
+    parameter.unit = model.parameters[entries[j]].physical_unit;
     parameter.before = at(parameter.before, true);
     parameter.after = at(parameter.after, true);
     parameter.change = at(parameter.change, false);
@@ -123,29 +125,91 @@ void in_physical_words(SetComparison& sets, const Model& model, const std::vecto
   }
 }
 
-std::string regressor_difference(const Model& before, const Model& after) {
+// The entries of θ of two models in one order: those that both have, then those of one alone.
+struct CommonOrder {
+  std::vector<std::size_t> before, after;  ///< place of each entry of a model's θ
+  std::size_t common = 0, all = 0;
+  std::vector<std::size_t> of_before;  ///< entry of the first model's θ at each common place
+  std::vector<std::size_t> of_after;   ///< likewise of the second
+};
+
+CommonOrder common_order(const Model& before, const Model& after) {
+  CommonOrder order;
+  order.before.assign(before.p(), before.p());
+  order.after.assign(after.p(), after.p());
+  for (std::size_t j = 0; j < before.p(); ++j) {
+    const auto other = std::ranges::find(after.parameters, before.parameters[j].name, &model::Parameter::name);
+    if (other == after.parameters.end()) {
+      continue;
+    }
+    const auto k = static_cast<std::size_t>(other - after.parameters.begin());
+    order.of_before.push_back(j);
+    order.of_after.push_back(k);
+    order.before[j] = order.after[k] = order.common++;
+  }
+  order.all = order.common;
+  for (std::size_t j = 0; j < before.p(); ++j) {
+    order.before[j] = order.before[j] == before.p() ? order.all++ : order.before[j];
+  }
+  for (std::size_t k = 0; k < after.p(); ++k) {
+    order.after[k] = order.after[k] == after.p() ? order.all++ : order.after[k];
+  }
+  return order;
+}
+
+// A set of one model in the order of both. What only the other has is anything in that one's box.
+struct LaidSet {
+  std::vector<HalfSpace> facets;
+  Box box;
+};
+
+LaidSet laid(const ParameterSet& set, const std::vector<std::size_t>& places, const ParameterSet& other,
+             const std::vector<std::size_t>& other_places, std::size_t all) {
+  LaidSet out;
+  out.box.sides.resize(all);
+  for (std::size_t k = 0; k < other_places.size(); ++k) {
+    out.box.sides[other_places[k]] = other.box.sides[k];
+  }
+  for (std::size_t j = 0; j < places.size(); ++j) {
+    out.box.sides[places[j]] = set.box.sides[j];
+  }
+  for (const HalfSpace& facet : set.facets) {
+    HalfSpace row{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(all)), facet.b, facet.origin};
+    for (std::size_t j = 0; j < places.size(); ++j) {
+      row.a[static_cast<Eigen::Index>(places[j])] = facet.a[static_cast<Eigen::Index>(j)];
+    }
+    out.facets.push_back(std::move(row));
+  }
+  return out;
+}
+
+std::string regressor_difference(const Model& before, const Model& after, const CommonOrder& order) {
+  if (before.name != after.name) {
+    return fmt::format("kinds of robot: {} and {}", before.name, after.name);
+  }
+  if (order.common == 0) {
+    return "parameters";
+  }
+  const auto terms_of = [&](const Model& model, const std::vector<std::size_t>& places) {
+    std::vector<Term> terms;
+    for (const Term& term : model.terms) {
+      if (places[term.parameter] < order.common) {
+        terms.push_back(term);
+        terms.back().parameter = places[term.parameter];
+      }
+    }
+    return terms;
+  };
   const auto same_term = [](const Term& x, const Term& y) {
     return x.output == y.output && x.parameter == y.parameter && x.kind == y.kind && x.coordinate == y.coordinate &&
            x.scale == y.scale && x.function == y.function;
   };
-  std::vector<std::string> names[2];
-  for (const auto& [model, list] : {std::pair(&before, &names[0]), std::pair(&after, &names[1])}) {
-    for (const model::Parameter& parameter : model->parameters) {
-      list->push_back(parameter.name);
-    }
+  bool same = before.motion == after.motion && before.input == after.input &&
+              std::ranges::equal(terms_of(before, order.before), terms_of(after, order.after), same_term);
+  for (std::size_t c = 0; c < order.common; ++c) {
+    same =
+        same && before.parameters[order.of_before[c]].per_physical == after.parameters[order.of_after[c]].per_physical;
   }
-  if (before.name != after.name) {
-    return fmt::format("kinds of robot: {} and {}", before.name, after.name);
-  }
-  if (names[0] != names[1]) {
-    return fmt::format("parameters: {} and {}", core::listed(names[0]), core::listed(names[1]));
-  }
-  const auto same_geometry = [](const model::Parameter& x, const model::Parameter& y) {
-    return x.per_physical == y.per_physical;
-  };
-  const bool same = before.motion == after.motion && before.input == after.input &&
-                    std::ranges::equal(before.terms, after.terms, same_term) &&
-                    std::ranges::equal(before.parameters, after.parameters, same_geometry);
   return same ? "" : "geometries in the robot files (wheel_radius, track_width, lever_arm)";
 }
 
@@ -203,7 +267,8 @@ std::vector<const SetComparison*> ModelComparison::telling() const {
 }
 
 ModelComparison compare_models(const detector::OnlineModel& before, const detector::OnlineModel& after) {
-  if (const std::string what = regressor_difference(before.model, after.model); !what.empty()) {
+  const CommonOrder order = common_order(before.model, after.model);
+  if (const std::string what = regressor_difference(before.model, after.model, order); !what.empty()) {
     throw InvalidArgument("models that cannot be compared, since their parameters do not mean the same: different " +
                           what + "; expected two models of one robot file's kind and geometry");
   }
@@ -213,6 +278,16 @@ ModelComparison compare_models(const detector::OnlineModel& before, const detect
         "robot files");
   }
   ModelComparison result;
+  for (std::size_t j = 0; j < before.model.p(); ++j) {
+    if (order.before[j] >= order.common) {
+      result.only_before.push_back(before.model.parameters[j].name);
+    }
+  }
+  for (std::size_t k = 0; k < after.model.p(); ++k) {
+    if (order.after[k] >= order.common) {
+      result.only_after.push_back(after.model.parameters[k].name);
+    }
+  }
   const auto compare = [&](const ParameterSet& x, const ParameterSet& y, core::Warrant warrant,
                            std::optional<double> risk) -> SetComparison& {
     SetComparison sets = compare_sets(x, y);
@@ -225,21 +300,35 @@ ModelComparison compare_models(const detector::OnlineModel& before, const detect
     return x.scale == y.scale && x.offset == y.offset;
   };
   const auto name = [&](SetComparison& sets) {
-    for (std::size_t j = 0; j < before.model.p(); ++j) {
-      const model::Parameter& parameter = before.model.parameters[j];
-      sets.parameters[j].name = sets.parameters[j].quantity = parameter.name;
-      sets.parameters[j].unit = parameter_unit(before.robot, parameter);
+    bool same_scales = scales && others;
+    for (std::size_t c = 0; c < order.common; ++c) {
+      const model::Parameter& parameter = before.model.parameters[order.of_before[c]];
+      sets.parameters[c].name = sets.parameters[c].quantity = parameter.name;
+      sets.parameters[c].unit = parameter_unit(before.robot, parameter);
+      same_scales = same_scales && same((*scales)[order.of_before[c]], (*others)[order.of_after[c]]);
     }
-    if (scales && others && std::ranges::equal(*scales, *others, same)) {
-      in_physical_words(sets, before.model, *scales);
+    if (same_scales) {
+      in_physical_words(sets, before.model, *scales, order.of_before);
     }
   };
-  name(compare({before.facets, before.box}, {after.facets, after.box}, core::weaker(before.warrant, after.warrant),
-               std::nullopt));
+  // What only one has explains no change: it is free in the other, whatever its value.
+  const auto of_theta = [&](const ParameterSet& x, const ParameterSet& y, core::Warrant warrant,
+                            std::optional<double> risk) {
+    const LaidSet first = laid(x, order.before, y, order.after, order.all);
+    const LaidSet second = laid(y, order.after, x, order.before, order.all);
+    SetComparison& sets = compare({first.facets, first.box}, {second.facets, second.box}, warrant, risk);
+    sets.parameters.resize(order.common);
+    std::erase_if(sets.explanations, [&](const ChangeExplanation& explanation) {
+      return std::ranges::any_of(explanation.parameters, [&](std::size_t j) { return j >= order.common; });
+    });
+    name(sets);
+  };
+  of_theta({before.facets, before.box}, {after.facets, after.box}, core::weaker(before.warrant, after.warrant),
+           std::nullopt);
   if (before.at_risk && after.at_risk) {
-    name(compare({before.at_risk->facets, before.at_risk->box}, {after.at_risk->facets, after.at_risk->box},
-                 core::weaker(before.at_risk->warrant, after.at_risk->warrant),
-                 core::round_up(before.at_risk->risk + after.at_risk->risk)));
+    of_theta({before.at_risk->facets, before.at_risk->box}, {after.at_risk->facets, after.at_risk->box},
+             core::weaker(before.at_risk->warrant, after.at_risk->warrant),
+             core::round_up(before.at_risk->risk + after.at_risk->risk));
   }
   if (!before.kinematic || !after.kinematic ||
       before.kinematic->measurement.parameters() != after.kinematic->measurement.parameters()) {

@@ -60,6 +60,7 @@ struct SetComparison {
 /// Result of compare_models(): the sets that both models have.
 struct ModelComparison {
   std::vector<SetComparison> sets;
+  std::vector<std::string> only_before, only_after;  ///< names of θ's entries that only one of the models has
 
   /// The sets that tell a change, in their order: for every noise before a stated risk.
   [[nodiscard]] std::vector<const SetComparison*> telling() const;
@@ -79,8 +80,9 @@ struct ParameterSet {
 [[nodiscard]] SetComparison compare_sets(const ParameterSet& before, const ParameterSet& after,
                                          std::size_t most_sets = 250);
 
-/// Compares all that two models have in common. Throws InvalidArgument, naming what differs, unless θ means the same in
-/// both: kind of robot, parameters, geometry, unit of the efforts.
+/// Compares all that two models have in common; a parameter that only one has (dry friction) may be anything in the
+/// other, and is no part of the sets that are returned. Throws InvalidArgument, naming what differs, unless the others
+/// mean the same in both: kind of robot, geometry, unit of the efforts; and where there are no others.
 [[nodiscard]] ModelComparison compare_models(const detector::OnlineModel& before, const detector::OnlineModel& after);
 
 }  // namespace wheelwright::commission

@@ -66,14 +66,18 @@ Json to_json(const commission::ModelComparison& comparison, const ComparedModel&
   for (const commission::SetComparison& each : comparison.sets) {
     sets.push_back(of_set(each));
   }
-  return {{"schema", "wheelwright/comparison/1"},
-          {"software", software},
-          {"before", of_model(before)},
-          {"after", of_model(after)},
-          {"changed", comparison.changed()},
-          {"message", words::verdict(comparison)},
-          {"explanations", words::explanations(comparison)},
-          {"sets", std::move(sets)}};
+  Json json = {{"schema", "wheelwright/comparison/1"},
+               {"software", software},
+               {"before", of_model(before)},
+               {"after", of_model(after)},
+               {"changed", comparison.changed()},
+               {"message", words::verdict(comparison)},
+               {"explanations", words::explanations(comparison)},
+               {"sets", std::move(sets)}};
+  if (const std::string rest = words::not_compared(comparison); !rest.empty()) {
+    json["not_compared"] = rest;
+  }
+  return json;
 }
 
 }  // namespace wheelwright::results

@@ -71,6 +71,9 @@ std::string comparison_report(const ModelComparison& comparison, const Compariso
   content.status = comparison.changed() ? "caution" : "good";
   content.verdict = core::capital(words::verdict(comparison)) + ".";
   content.sentences = words::explanations(comparison);
+  if (const std::string rest = words::not_compared(comparison); !rest.empty()) {
+    content.sentences.push_back(rest);
+  }
   content.sentences.insert(content.sentences.end(), context.remarks.begin(), context.remarks.end());
   const auto telling = comparison.telling();
   content.warrant = (telling.empty() ? comparison.sets.front() : *telling.front()).warrant;

@@ -100,8 +100,27 @@ std::string quantity_words(const ParameterChange& parameter) {
   return spaced(parameter.quantity) + (unit.empty() ? "" : ", " + unit);
 }
 
+std::string not_compared(const ModelComparison& comparison) {
+  std::vector<std::string> parts;
+  const auto add = [&](const std::vector<std::string>& names, std::string_view which) {
+    if (!names.empty()) {
+      parts.push_back(
+          fmt::format("{} {} in the {} model only", core::listed(names), names.size() == 1 ? "is" : "are", which));
+    }
+  };
+  add(comparison.only_before, "first");
+  add(comparison.only_after, "second");
+  return parts.empty() ? ""
+                       : core::enumerated(parts) +
+                             ": it was not compared; the other model takes it for zero, so that a change of another "
+                             "parameter may be what that model lacks.";
+}
+
 std::string summary(const ModelComparison& comparison) {
   std::string text = core::capital(verdict(comparison)) + ".\n";
+  if (const std::string rest = not_compared(comparison); !rest.empty()) {
+    text += "  " + rest + "\n";
+  }
   for (const std::string& sentence : explanations(comparison)) {
     text += "  " + sentence + "\n";
   }

@@ -26,6 +26,10 @@ namespace wheelwright::words {
 /// What explains the change, a sentence for each explanation of each set that tells one; empty where none does.
 [[nodiscard]] std::vector<std::string> explanations(const commission::ModelComparison& comparison);
 
+/// What only one of the models has, in sentences, and that a change of the others may be what the other model lacks;
+/// empty where both have the same.
+[[nodiscard]] std::string not_compared(const commission::ModelComparison& comparison);
+
 /// The whole for a terminal: verdict, explanations, a table for each set.
 [[nodiscard]] std::string summary(const commission::ModelComparison& comparison);
 
