@@ -328,7 +328,7 @@ Eigen::VectorXd fit_base(const Drive& drive, double beta) {
   const Eigen::Index instants = use.count();
   if (instants < 10 * p) {
     throw InputError("the log has " + std::to_string(instants) + " instants in motion after the filter has settled: " +
-                     std::to_string(10 * p) + " are needed; drive longer");
+                     std::to_string(10 * p) + " are needed; " + why_few_rows(drive, beta));
   }
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(instants * n, p);
   Eigen::VectorXd b(instants * n);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <numbers>
 #include <utility>
 
@@ -12,12 +13,14 @@
 #include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
+#include "model/filter/encoder.hpp"
 
 namespace wheelwright::gap {
 namespace {
 
 constexpr double kUneven = 0.01;        // share of the median step
 constexpr double kRestSpeed = 0.01;     // of the root mean square of the speed
+constexpr double kCountedRest = 0.05;   // likewise, of an encoder of which a count in the shortest rest is faster
 constexpr std::size_t kFewestRows = 3;  // of a segment
 
 using Series = std::vector<double>;
@@ -208,12 +211,61 @@ double noise_by_differences(const Eigen::VectorXd& x) {
   return core::median(std::move(magnitude)) / (0.6744897501960817 * std::sqrt(20.0));
 }
 
-Mask find_rest(const Drive& drive, const JointSignals& joint, double shortest) {
+// An encoder that stands still shows the two sides of a count at most: a joint rests where its angle stays within
+// `count` (rad) for `shortest` s, or longer where a count in that time would be fast for it.
+Mask find_counted_rest(const Drive& drive, const JointSignals& joint, double count, double shortest, double rms) {
+  const double longest = rms > 0.0 ? count / (kCountedRest * rms) : shortest;
+  const auto fewest = static_cast<Eigen::Index>(std::ceil(std::max(shortest, longest) / drive.step - 1e-9));
+  constexpr double slack = 1.0 + 1e-6;
+  Mask rest = Mask::Constant(joint.speed.size(), false);
+  for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+    const auto [first, last] = drive.segment(s);
+    std::deque<std::pair<Eigen::Index, double>> low, high;  // of the window [from, k]: falling and rising bounds
+    double angle = 0.0;
+    Eigen::Index from = first, marked = first;
+    for (Eigen::Index k = first; k < last; ++k) {
+      angle += joint.speed[k] * drive.step;
+      while (!low.empty() && low.back().second >= angle) low.pop_back();
+      while (!high.empty() && high.back().second <= angle) high.pop_back();
+      low.emplace_back(k, angle);
+      high.emplace_back(k, angle);
+      while (high.front().second - low.front().second > count * slack) {
+        ++from;
+        if (low.front().first < from) low.pop_front();
+        if (high.front().first < from) high.pop_front();
+      }
+      if (k + 1 - from >= fewest) {
+        const Eigen::Index begin = std::max(from, marked);
+        rest.segment(begin, k + 1 - begin).setConstant(true);
+        marked = k + 1;
+      }
+    }
+  }
+  return rest;
+}
+
+// One count of the angles in `columns[joint]`, rad; 0 where they are not made of counts.
+double count_of_angles(const std::vector<double>& angle, const std::vector<std::size_t>& starts) {
+  std::vector<double> steps;
+  for (std::size_t s = 0; s + 1 < starts.size(); ++s) {
+    for (std::size_t k = starts[s] + 1; k < starts[s + 1]; ++k) {
+      steps.push_back(angle[k] - angle[k - 1]);
+    }
+  }
+  const auto encoder = filter::find_encoder_of_angles(steps);
+  return encoder ? encoder->speed_step : 0.0;
+}
+
+// `count` is that of the joint's encoder, rad; 0 where none is known.
+Mask find_rest(const Drive& drive, const JointSignals& joint, double shortest, double count) {
   const Eigen::Index n = joint.speed.size();
   const double rms = std::sqrt(joint.smooth_speed.squaredNorm() / static_cast<double>(n));
+  if (count > 0.0) {
+    return find_counted_rest(drive, joint, count, shortest, rms);
+  }
   // The value of the quadratic at the middle of w samples has the variance 9/(4w) σ².
   const double noise = noise_by_differences(joint.speed) * std::sqrt(2.25 / static_cast<double>(drive.window));
-  const double limit = std::max({drive.count, 4.0 * noise, kRestSpeed * rms});
+  const double limit = std::max(4.0 * noise, kRestSpeed * rms);
   const auto fewest = static_cast<Eigen::Index>(std::ceil(shortest / drive.step));
   Mask rest = joint.smooth_speed.array().abs() <= limit;
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
@@ -434,9 +486,13 @@ Drive make_drive(const LogTable& log, const Robot& robot, const Measurement& mea
     append_segment(drive, part(log.t, starts[s], starts[s + 1]), part(columns, starts[s], starts[s + 1]), measurement);
   }
   check::that(drive.rows() > 0, "the log", "a segment of at least three samples");
-  for (JointSignals& joint : drive.joints) {
+  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+    JointSignals& joint = drive.joints[j];
     smooth_joint(drive, joint);
-    joint.resting = find_rest(drive, joint, options.shortest_rest);
+    const double count = measurement.motion == MotionKind::angle
+                             ? count_of_angles(log.column(measurement.motion_columns[j]), starts)
+                             : drive.count * drive.step;
+    joint.resting = find_rest(drive, joint, options.shortest_rest, count);
   }
   for (Eigen::Index c = 0; c < drive.model.motion.rows(); ++c) {
     const Eigen::MatrixXd& motion = drive.model.motion;

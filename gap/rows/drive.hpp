@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -98,8 +99,10 @@ struct DriveOptions {
 /// - Smooth signals are those of a local quadratic over `smoothing_window` (Savitzky and Golay 1964), fitted
 ///   one-sidedly at the ends of a segment and never across them.
 /// - Unsigned efforts take the sign of their joint's motion.
-/// - A joint stands still where its smooth speed stays below `count`, four standard deviations of its noise or
-///   1 % of its root mean square, whichever is largest, for `shortest_rest`.
+/// - A joint whose encoder is known, or found in its angles, stands still where its angle stays within one count for
+///   `shortest_rest`, or for as long as makes a count slower than 5 % of its root mean square. Any other does where its
+///   smooth speed stays below four standard deviations of its noise or 1 % of its root mean square, whichever is
+///   larger, for `shortest_rest`.
 ///
 /// Throws InvalidArgument when `log` lacks a column of `measurement` or has no segment of three samples.
 [[nodiscard]] Drive make_drive(const LogTable& log, const Robot& robot, const Measurement& measurement,
@@ -141,6 +144,9 @@ void smooth_quadratic(std::span<const double> signal, std::size_t window, std::s
 /// Rows for which no joint's filtered indicator of rest exceeds `share`: with stiction the torque of a resting joint
 /// is any number, and no model of motion says anything about it. None for a drive without efforts.
 [[nodiscard]] Mask moving(const Drive& drive, double beta, double share = 0.02);
+
+/// Why few rows of `drive` are settled() and moving(), and what to do: "of 900 rows …; drive longer".
+[[nodiscard]] std::string why_few_rows(const Drive& drive, double beta);
 
 /// The rows that `use` marks among every so many that are about `row_step`/β apart, from the first row on.
 [[nodiscard]] std::vector<Eigen::Index> rows_apart(const Drive& drive, const Mask& use, double row_step, double beta);

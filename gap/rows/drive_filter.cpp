@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <array>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <Eigen/Core>
 
 #include "core/check.hpp"
@@ -136,6 +138,22 @@ Mask moving(const Drive& drive, double beta, double share) {
     mask = mask && filtered(drive, beta, joint.resting.cast<double>().matrix()).array() <= share;
   }
   return mask;
+}
+
+std::string why_few_rows(const Drive& drive, double beta) {
+  constexpr double memory = 10.0;
+  const Mask ready = settled(drive, beta, memory);
+  const Eigen::Index left = ready.count(), used = (ready && moving(drive, beta)).count();
+  const bool cut = drive.segment_starts.size() > 1 && 2 * left < drive.rows();
+  const bool stands = 2 * used < left;
+  return fmt::format(
+      "of {} rows {} come in the {:.2g} s after each of {} beginning{} in which the filter settles, and {} "
+      "of the others while a wheel stands still; {}",
+      drive.rows(), drive.rows() - left, memory / beta, drive.segment_starts.size(),
+      drive.segment_starts.size() == 1 ? "" : "s", left - used,
+      cut      ? "record without gaps (`wheelwright doctor` names them), or drive longer"
+      : stands ? "let the robot stand less, or drive longer"
+               : "drive longer");
 }
 
 std::vector<Eigen::Index> rows_apart(const Drive& drive, const Mask& use, double row_step, double beta) {

@@ -318,7 +318,7 @@ GapRows make_gap_rows(const Drive& drive, const NoiseFloor& floor, const std::ve
   rows.instants = effort_rows(drive, options);
   if (drive.has_efforts && rows.instants.size() < 50) {
     throw InputError("the log has " + std::to_string(rows.instants.size()) +
-                     " usable instants: at least 50 in motion are needed; drive longer");
+                     " usable instants: at least 50 in motion are needed; " + why_few_rows(drive, options.beta));
   }
   const Eigen::VectorXd t = picked(drive.t, rows.instants);
   const std::vector<Eigen::VectorXd> y = filtered_outputs(drive, options.beta);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gap/rows/drive.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -96,6 +97,39 @@ TEST(Drive, AJointRestsWhereItStandsLongEnough) {
   EXPECT_FALSE(mask[150]);
   EXPECT_TRUE(mask[60]);
   EXPECT_TRUE(mask[399]);
+}
+
+// A sine of 5 rad/s that stands still for a second of eight, read by encoders from fine to coarse: neither a count a
+// step nor the rounding of one is rest.
+TEST(Drive, ACoarseEncoderThatTurnsDoesNotRest) {
+  const double turn = 2.0 * std::acos(-1.0);
+  const auto angle = [](double t) {
+    const double driven = t < 4.0 ? t : std::max(4.0, t - 1.0);
+    return 2.5 * driven - std::sin(driven);
+  };
+  for (const double counts : {100.0, 400.0, 800.0, 2048.0, 32768.0}) {
+    for (const double rate : {20.0, 100.0, 500.0}) {
+      for (const bool speeds : {false, true}) {
+        const double h = 1.0 / rate, count = turn / counts;
+        const auto counted = [&](double t) { return std::floor(angle(t) / count) * count; };
+        const auto moved = [&](double t) { return (counted(t) - counted(t - h)) / h; };
+        Measurement of = measurement();
+        of.motion = speeds ? MotionKind::mean_speed : MotionKind::angle;
+        of.count = speeds ? count * rate : 0.0;
+        const std::vector<double> t = even(static_cast<int>(8.0 * rate), h);
+        const LogTable log = speeds ? log_of(t, moved, moved) : log_of(t, counted, counted);
+        const Drive drive = make_drive(log, axis(), of);
+        const Mask& rest = drive.joints[0].resting;
+        double wrong = 0.0, missed = 0.0;
+        for (Eigen::Index k = 0; k < drive.rows(); ++k) {
+          wrong += rest[k] && (drive.t[k] < 3.7 || drive.t[k] > 5.3) ? 1.0 : 0.0;
+          missed += !rest[k] && drive.t[k] > 4.1 && drive.t[k] < 4.9 ? 1.0 : 0.0;
+        }
+        EXPECT_EQ(wrong, 0.0) << counts << " at " << rate << (speeds ? " speeds" : " angles");
+        EXPECT_EQ(missed, 0.0) << counts << " at " << rate << (speeds ? " speeds" : " angles");
+      }
+    }
+  }
 }
 
 TEST(Drive, PredictedEffortIsTheModelOnTheSmoothMotion) {
