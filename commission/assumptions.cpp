@@ -259,11 +259,10 @@ Assumption motion_between_samples(const Commissioning& r) {
   if (!error || r.survey.median_step <= 0.0) {
     return a;
   }
-  const double h = r.survey.median_step;
-  const double noise = m.motion == MotionKind::speed ? 2.0 * *error / h : 4.0 * *error / (h * h);
   double shown = 0.0;
-  for (const double sharp : r.survey.sharpest_change) {
-    shown = std::max(shown, sharp - noise);
+  for (std::size_t j = 0; j < r.survey.sharpest_change.size(); ++j) {
+    shown = std::max(
+        shown, r.survey.sharpest_change[j] - acceleration_by_noise(r.survey, j, m.motion, *error, m.shortest_step));
   }
   a.verdict = shown <= limit->second ? AssumptionVerdict::holds : AssumptionVerdict::fails;
   a.detail = fmt::format("the samples show {:.3g}", shown);

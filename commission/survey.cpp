@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
+
+#include "core/statistics.hpp"
 
 namespace wheelwright::commission {
 namespace {
@@ -14,6 +17,14 @@ class JointWatch {
   void restart() {
     filled_ = 0;
     steps_ = 0;
+    changes_ = 0;
+  }
+
+  // Standard deviation of the changes of the speed by noise alone: third differences of white noise σ have 20 σ², first
+  // ones 2 σ².
+  [[nodiscard]] double change_noise() {
+    constexpr double kMedianOfNormal = 0.6744897501960817;
+    return thirds_.empty() ? 0.0 : core::median(std::move(thirds_)) / kMedianOfNormal / std::sqrt(10.0);
   }
 
   void add(double t, double value, bool is_angle, double& top_speed, double& top_acceleration, double& sharpest,
@@ -51,10 +62,14 @@ class JointWatch {
     const double h = t - last_t_;
     if (!is_angle) {
       sharpest = steps_ > 0 ? std::max(sharpest, std::abs(value - last_) / h) : sharpest;
+      if (steps_ > 0) {
+        add_change(value - last_);
+      }
     } else if (steps_ > 0) {
       const double slope = (value - last_) / h;
       if (steps_ > 1) {
         sharpest = std::max(sharpest, std::abs(slope - last_slope_) / (0.5 * (h + last_step_)));
+        add_change(slope - last_slope_);
       }
       last_slope_ = slope;
     }
@@ -64,6 +79,19 @@ class JointWatch {
     ++steps_;
   }
 
+  void add_change(double change) {
+    constexpr std::size_t kMost = 65536;
+    if (changes_ >= 2 && thirds_.size() < kMost) {
+      thirds_.push_back(std::abs(change - 2.0 * before_ + before_that_));
+    }
+    before_that_ = before_;
+    before_ = change;
+    ++changes_;
+  }
+
+  std::vector<double> thirds_;
+  std::size_t changes_ = 0;
+  double before_ = 0.0, before_that_ = 0.0;
   std::size_t steps_ = 0;
   double last_t_ = 0.0, last_ = 0.0, last_step_ = 0.0, last_slope_ = 0.0;
   std::array<double, 2 * kSurveyWindow + 1> times_{}, values_{};
@@ -116,7 +144,22 @@ Survey survey(LogSource& log, const Measurement& measurement) {
     close_segment();
   }
   log.rewind();
+  for (JointWatch& w : watch) {
+    s.change_noise.push_back(w.change_noise());
+  }
   return s;
+}
+
+double acceleration_by_noise(const Survey& survey, std::size_t j, MotionKind motion, double motion_error,
+                             double shortest_step) {
+  const double h = survey.median_step;
+  const double shortest = std::clamp(shortest_step > 0.0 ? shortest_step : h, 0.5 * h, h);
+  const double bound = motion == MotionKind::speed ? 2.0 * motion_error / h : 4.0 * motion_error / (h * h);
+  const double deviation = j < survey.change_noise.size() ? survey.change_noise[j] : 0.0;
+  // The largest of n normal errors is below sqrt(2 ln 2n) standard deviations in half of the cases.
+  const double largest =
+      std::sqrt(2.0 * std::log(2.0 * static_cast<double>(std::max<std::size_t>(survey.rows, 1)))) + 1.0;
+  return std::max(bound, largest * deviation / shortest);
 }
 
 std::vector<double> acceleration_limit(const Robot& robot, const Survey& survey, MotionKind motion,

@@ -24,8 +24,16 @@ struct Survey {
   std::vector<double> largest_acceleration;  ///< per joint, over windows of kSurveyWindow steps, rad/s² or m/s²
   std::vector<double> sharpest_change;       ///< per joint, from one step to the next, of the speed over time, noise
                                              ///< and all, rad/s² or m/s²
-  std::vector<double> reversals;             ///< per joint: how often its speed changed sign
+  std::vector<double> change_noise;  ///< per joint, standard deviation of what noise alone makes of a speed from
+                                     ///< one step to the next, by third differences of at most 65,536 speeds
+  std::vector<double> reversals;     ///< per joint: how often its speed changed sign
 };
+
+/// What the noise of the samples alone may show as the largest acceleration of joint `j` from one step to the next:
+/// errors of `motion_error` (of the motion column, rad or rad/s), or the largest that `change_noise` makes in so many
+/// rows, whichever is more, over a step as short as `shortest_step` has it, but not below half the median.
+[[nodiscard]] double acceleration_by_noise(const Survey& survey, std::size_t j, MotionKind motion, double motion_error,
+                                           double shortest_step);
 
 /// Acceleration is measured over windows of ten steps: unfiltered differences would show the encoder, not the robot.
 inline constexpr std::size_t kSurveyWindow = 10;

@@ -10,6 +10,7 @@
 #include "commission/commission.hpp"
 #include "formats/files/bytes.hpp"
 #include "tests/support/drives.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::commission::assumptions_test {
 
@@ -154,6 +155,41 @@ TEST(Assumptions, ADeclaredAccelerationIsHeldAgainstTheSamples) {
   EXPECT_EQ(with_limit(7.9), Verdict::fails);
   c.model.robot.limits.clear();
   EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::not_tested);
+}
+
+// A wheel that reaches 36 rad/s², its speed read with noise or in steps of an encoder: differences of single samples
+// show several times as much.
+TEST(Assumptions, AnAccelerationReadFromSamplesAllowsForTheirNoise) {
+  testing_support::Random random(5);
+  for (const double rate : {50.0, 100.0, 500.0}) {
+    for (const double noise : {0.0, 0.03, 0.3}) {
+      const std::size_t rows = 6000;
+      LogTable log;
+      log.names = {"omega_r", "omega_l"};
+      log.columns.assign(2, {});
+      for (std::size_t k = 0; k < rows; ++k) {
+        const double t = static_cast<double>(k) / rate;
+        log.t.push_back(t);
+        for (std::size_t j = 0; j < 2; ++j) {
+          log.columns[j].push_back(12.0 * std::sin(3.0 * t) + noise * random.normal());
+        }
+      }
+      Measurement measurement;
+      measurement.motion = MotionKind::speed;
+      measurement.motion_columns = {"omega_r", "omega_l"};
+      TableSource source(log);
+      Commissioning c;
+      c.survey = survey(source, measurement);
+      c.model.measurement = measurement;
+      c.model.robot.noise.wheel_speed.value = 1e-3;
+      c.model.robot.limits["acceleration"] = 40.0;
+      EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::holds) << rate << " " << noise;
+      c.model.robot.limits["acceleration"] = 15.0;
+      if (noise * rate < 2.0) {  // else noise hides what is beyond
+        EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::fails) << rate << " " << noise;
+      }
+    }
+  }
 }
 
 // Intervals stand on the log, thresholds on driving to come.
