@@ -300,9 +300,11 @@ std::vector<std::string> quantities(const Json& model) {
   const Json physical = model.value("physical", Json::object());
   for (const auto& [name, of] : physical.items()) {
     if (of.at("estimate").is_number() && of.at("lower").is_number() && of.at("upper").is_number()) {
-      out.push_back(fmt::format("{} {:.4g} {}, {} between {:.4g} and {:.4g}", name, of.at("estimate").get<double>(),
-                                of.at("unit").get<std::string>(), model.value("warrant", "extrapolated"),
-                                of.at("lower").get<double>(), of.at("upper").get<double>()));
+      const std::string word =
+          model.contains("little_learned") ? "" : model.value("warrant", std::string("extrapolated")) + " ";
+      out.push_back(fmt::format("{} {:.4g} {}, {}between {:.4g} and {:.4g}", name, of.at("estimate").get<double>(),
+                                of.at("unit").get<std::string>(), word, of.at("lower").get<double>(),
+                                of.at("upper").get<double>()));
     }
   }
   return out;
@@ -425,7 +427,9 @@ int run(const Arguments& given) {
       if (const std::string least = smallest_change(model, robot); !least.empty()) {
         verdict += "; " + least;
       }
-      page.content.warrant = robots::read_model(out / "commission" / "model.json").warrant;
+      if (!model.contains("little_learned")) {
+        page.content.warrant = robots::read_model(out / "commission" / "model.json").warrant;
+      }
       page.section("commission", quantities(model));
       if (call(add_margins,
                words("margins",

@@ -2,12 +2,14 @@
 #include "commission/assumptions.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "commission/commission.hpp"
 #include "commission/noise_budget.hpp"
+#include "commission/physical.hpp"
 
 namespace wheelwright::commission {
 
@@ -18,6 +20,10 @@ using core::Warrant;
 namespace {
 
 constexpr const char* kMotionInDriving = "motion_in_driving";
+
+// Violations that a test would not have shown below these say nothing: factor on the errors of a log, s and steps of a
+// shift, shares of a length and of the efforts' gain.
+constexpr double kToldErrors = 5.0, kToldShift = 0.01, kToldSteps = 2.0, kToldLength = 0.05, kToldGain = 0.25;
 
 constexpr const char* kRowsExplained =
     "some parameters explain every row within its bound, and none of the held-out rows "
@@ -50,7 +56,10 @@ RowsVerdict rows_verdict(const Commissioning& r) {
                         outside, instants)};
   }
   const auto doubt = std::ranges::find_if(r.contradictions, [](const LogContradiction& c) {
-    return c.demotes && c.kind != LogContradiction::Kind::effort_timing;
+    using Kind = LogContradiction::Kind;
+    const bool of_its_own = c.kind == Kind::effort_timing || c.kind == Kind::halves_disagree ||
+                            c.kind == Kind::effort_offset || c.kind == Kind::friction_shape;
+    return c.demotes && !of_its_own;
   });
   if (doubt != r.contradictions.end()) {
     return {AssumptionVerdict::fails, doubt->sentence};
@@ -61,7 +70,24 @@ RowsVerdict rows_verdict(const Commissioning& r) {
                                                : "the noise bounds were learnt from the rows that they would have to "
                                                  "judge"};
   }
-  return {AssumptionVerdict::holds, fmt::format("{} instants held out, none outside", instants)};
+  double used = 0.0;
+  for (const OutputValidation& v : r.validation) {
+    used = std::max(used, v.utilisation);
+  }
+  const std::string none = fmt::format("{} instants held out, none outside", instants);
+  if (!(kToldErrors * used >= 1.0)) {
+    return {AssumptionVerdict::not_tested,
+            none + (used > 0.0 ? fmt::format(": errors {:.2g} times as large as those of this log would be inside, too",
+                                             1.0 / used)
+                               : std::string())};
+  }
+  return {AssumptionVerdict::holds,
+          fmt::format("{}; errors {:.2g} times as large as those of this log would have been", none, 1.0 / used)};
+}
+
+// What the rows say of a premise together with what statistics say of it.
+RowsVerdict premise_verdict(const RowsVerdict& rows, const PremiseVerdict& premise) {
+  return rows.verdict == AssumptionVerdict::fails ? rows : RowsVerdict{premise.verdict, premise.detail};
 }
 
 Assumption assumed_hold(const Robot& robot) {
@@ -89,8 +115,10 @@ Assumption assumed_delay(const Commissioning& r) {
     a.verdict = AssumptionVerdict::fails;
     a.detail = latency->sentence;
   } else if (r.effort_shift) {
-    a.verdict = AssumptionVerdict::holds;
-    a.detail = fmt::format("the best shift is {:.2g} s", *r.effort_shift);
+    const bool told = r.effort_shift_told <= std::max(kToldShift, kToldSteps * r.survey.median_step);
+    a.verdict = told ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
+    a.detail = fmt::format("the best shift is {:.2g} s; one of {:.2g} s beyond what is declared would have shown",
+                           *r.effort_shift, r.effort_shift_told);
   } else {
     a.detail = "the log tells no shift";
   }
@@ -150,6 +178,17 @@ Assumption assumed_geometry(const Commissioning& r) {
     }
   }
   const bool bounds_learnt = std::ranges::any_of(k.noise, learnt);
+  double open = 0.0;  // the largest half width
+  for (const KinematicParameter& p : k.parameters) {
+    if (p.name != "gyro_bias" && p.nominal != 0.0) {
+      open = std::max(open, 0.5 * (p.upper - p.lower) / std::abs(p.nominal));
+    }
+  }
+  if (a.detail.empty() && !bounds_learnt) {
+    a.detail = fmt::format("each is told to ± {:.2g} %", 100.0 * open);
+    a.verdict = open <= kToldLength ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
+    return a;
+  }
   a.verdict = a.detail.empty() ? AssumptionVerdict::holds
               : bounds_learnt  ? AssumptionVerdict::not_tested
                                : AssumptionVerdict::fails;
@@ -207,25 +246,91 @@ void add_noise_bounds(std::vector<Assumption>& list, const Commissioning& r, con
   }
 }
 
+// A constant part of the efforts' errors, which averages out of nothing.
+void add_effort_offset(std::vector<Assumption>& list, const Commissioning& r) {
+  const model::NoiseBound& effort = r.model.robot.noise.effort;
+  if (!effort.value || std::ranges::any_of(r.noise, learnt)) {
+    return;
+  }
+  list.push_back({.id = "effort_offset",
+                  .statement = fmt::format("No effort is off throughout by more than {:g} {}.",
+                                           std::min(effort.bias.value_or(*effort.value), *effort.value),
+                                           r.model.model.output_units.empty()
+                                               ? std::string()
+                                               : output_unit(r.model.robot, r.model.model.output_units.front())),
+                  .declared_by = effort.bias ? "noise.effort.bias" : "noise.effort",
+                  .test = "each joint's offset beside the model, by least squares, reaches into that",
+                  .verdict = r.premises.offset.verdict,
+                  .detail = r.premises.offset.detail});
+}
+
+// A gain that all efforts have is a factor on all parameters: only a quantity known from outside tells it.
+Assumption effort_gain(const Commissioning& r) {
+  Assumption a{.id = "effort_gain",
+               .statement = "Efforts are what acts at the wheels: torque constant, gear and unit are right.",
+               .declared_by = "effort, motor",
+               .test = "the mass (inertia) that the efforts show lies within its declared prior"};
+  a.detail =
+      "a gain of the efforts and all parameters times that gain explain the same log: a weighed mass, declared "
+      "as `prior: {mass: [lower, upper]}`, would tell";
+  for (std::size_t j = 0; j < r.parameters.size() && j < r.prior.sides.size(); ++j) {
+    const ParameterResult& p = r.parameters[j];
+    const Interval& prior = r.prior.sides[j];
+    if (!p.parameter.moved_mass || !r.model.robot.prior.contains(p.parameter.physical) || p.lower_is_prior ||
+        p.upper_is_prior || !(p.lower > 0.0) || !(prior.lower > 0.0)) {
+      continue;
+    }
+    const double told = std::max(prior.upper / p.lower, p.upper / prior.lower) - 1.0;
+    a.verdict = told <= kToldGain ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
+    a.detail =
+        fmt::format("a gain off by {:.2g} % would have left the prior of {}", 100.0 * told, p.parameter.physical);
+  }
+  return a;
+}
+
+Assumption wheel_directions(const Commissioning& r) {
+  Assumption a{.id = "wheel_directions",
+               .statement = "Both wheels count up, and their efforts with them, when the robot drives ahead.",
+               .declared_by = {},
+               .test = "gyro or pose turn as the wheels do; without them, it drives more than it turns on the spot"};
+  if (r.premises.turning && *r.premises.turning > 1.0) {
+    a.verdict = AssumptionVerdict::fails;
+    a.detail = fmt::format(
+        "as its wheels count, it turns on the spot more than it drives ({:.2g} times as fast), and neither gyro nor "
+        "pose tells whether one of them counts backwards",
+        *r.premises.turning);
+  } else if (r.kinematic.status == KinematicCommissioning::Status::done) {
+    a.verdict = AssumptionVerdict::holds;
+    a.detail = "each wheel turns the robot to the side that it should";
+  } else {
+    a.detail = "neither gyro nor pose shows it";
+  }
+  return a;
+}
+
 Assumption model_shape(const Commissioning& r, const RowsVerdict& rows) {
   const bool dry = std::ranges::any_of(r.parameters, [](const ParameterResult& p) { return p.parameter.dry_friction; });
+  const RowsVerdict said = premise_verdict(rows, r.premises.friction);
   const std::string friction = dry ? "viscous and dry" : "viscous only";
   const std::string effects = r.model.robot.effects.empty() ? "" : ", with the effects that the robot file names";
   return {.id = "friction_shape",
           .statement = fmt::format("A rigid robot on level ground without slip; friction is {}{}.", friction, effects),
           .declared_by = "parameters, effects",
-          .test = kRowsExplained,
-          .verdict = rows.verdict,
-          .detail = rows.detail};
+          .test = fmt::format("{}; friction of other shapes, by least squares, is none", kRowsExplained),
+          .verdict = said.verdict,
+          .detail = said.detail};
 }
 
-Assumption constant_parameters(const RowsVerdict& rows) {
+Assumption constant_parameters(const Commissioning& r, const RowsVerdict& rows) {
+  const RowsVerdict said = premise_verdict(rows, r.premises.constant);
   return {.id = "constant_parameters",
           .statement = "Mass, inertia and friction are the same throughout the log, and in driving to come.",
           .declared_by = {},
-          .test = "no held-out row leaves the threshold that was made without it",
-          .verdict = rows.verdict,
-          .detail = rows.detail};
+          .test =
+              "no held-out row leaves the threshold that was made without it; parts of the log, by least squares, "
+              "give the same",
+          .verdict = said.verdict,
+          .detail = said.detail};
 }
 
 Assumption lost_rows(const Measurement& m, const Survey& survey) {
@@ -265,8 +370,11 @@ Assumption motion_between_samples(const Commissioning& r) {
   for (const double sharp : r.survey.sharpest_change) {
     shown = std::max(shown, sharp - noise);
   }
-  a.verdict = shown <= limit->second ? AssumptionVerdict::holds : AssumptionVerdict::fails;
-  a.detail = fmt::format("the samples show {:.3g}", shown);
+  // A violation shows once it is beyond what errors may hide of it.
+  a.verdict = shown > limit->second   ? AssumptionVerdict::fails
+              : noise > limit->second ? AssumptionVerdict::not_tested
+                                      : AssumptionVerdict::holds;
+  a.detail = fmt::format("the samples show {:.3g}, of which their errors may hide {:.3g}", shown, noise);
   return a;
 }
 
@@ -335,8 +443,10 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   std::vector<Assumption> list = {assumed_hold(robot), assumed_delay(result), assumed_clocks(result),
                                   assumed_speeds(result.model.measurement)};
   add_noise_bounds(list, result, rows);
+  add_effort_offset(list, result);
+  list.push_back(effort_gain(result));
   list.push_back(model_shape(result, rows));
-  list.push_back(constant_parameters(rows));
+  list.push_back(constant_parameters(result, rows));
   list.push_back(lost_rows(result.model.measurement, result.survey));
   list.push_back(motion_between_samples(result));
   if (result.model.errors.between_samples && !robot.limits.contains("acceleration")) {
@@ -346,6 +456,7 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   add_limits(list, robot);
   if (model::on_two_wheels(robot)) {
     list.push_back(assumed_geometry(result));
+    list.push_back(wheel_directions(result));
   }
   if (result.kinematic.model) {
     list.push_back({.id = "pose_independent",
@@ -359,6 +470,21 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
 
 void settle_warrants(Commissioning& result) {
   result.assumptions = assumptions_of(result);
+  apply_verdicts(result);
+}
+
+void withdraw_what_averages_would_hide(Commissioning& result, const std::string& detail) {
+  for (Assumption& assumption : result.assumptions) {
+    if (assumption.id == "friction_shape" || assumption.id == "constant_parameters" || assumption.id == "geometry") {
+      assumption.verdict = AssumptionVerdict::fails;
+      assumption.detail = fmt::format("errors of efforts do not average out as declared: {}", detail);
+    }
+  }
+  result.message += fmt::format("; nothing is called guaranteed: {}", detail);
+  apply_verdicts(result);
+}
+
+void apply_verdicts(Commissioning& result) {
   bool contradicted = false, driving_contradicted = false;
   for (const Assumption& assumption : result.assumptions) {
     if (assumption.verdict == AssumptionVerdict::fails) {

@@ -432,6 +432,10 @@ std::string reservations(const Setting& s, const Commissioning& result) {
   if (!indistinct.empty()) {
     text += "; not told from zero: " + indistinct;
   }
+  const auto doubt = std::ranges::find_if(result.contradictions, &LogContradiction::demotes);
+  if (doubt != result.contradictions.end() && s.noise_complete) {
+    text += fmt::format("; nothing is called guaranteed: {}", doubt->sentence);
+  }
   if (s.measurement.effort_unsigned) {
     text +=
         "; the effort is unsigned, so that braking and driving cannot be told apart: take the friction terms as "
@@ -481,23 +485,55 @@ bool withdrawn(const Commissioning& result) {
   return std::ranges::any_of(result.contradictions, [](const LogContradiction& c) { return c.withdraws; });
 }
 
-// What makes a model that came out one of little use; empty where nothing does.
-std::string little_learned(const Commissioning& result) {
-  std::string text, open;
-  if (sees_nothing(result.validation)) {
-    text =
-        "no fault that scales the effort is certain to be seen on driving like this, since thresholds are as wide as "
-        "the efforts";
+// Half width of a parameter's interval over its estimate; 0 where there is no estimate.
+double relative_half_width(const ParameterResult& p) {
+  return p.estimate && *p.estimate != 0.0 ? 0.5 * (p.upper - p.lower) / std::abs(*p.estimate) : 0.0;
+}
+
+// Parameters that the efforts of the log stand on, by the share that they have in them at least.
+std::vector<std::size_t> weighty(const Fit& fit) {
+  constexpr double kWeighty = 0.2;
+  const auto instants = static_cast<double>(std::max<std::size_t>(fit.squares.instants, 1));
+  const double effort = std::sqrt(fit.squares.weighted_tss / instants);
+  std::vector<std::size_t> result;
+  for (std::size_t j = 0; j < fit.excitation.size(); ++j) {
+    const auto at = static_cast<Eigen::Index>(j);
+    if (fit.excitation[j].state != identify::Excitation::not_excited &&
+        fit.squares.column_rms[at] * std::abs(fit.estimate[at]) >= kWeighty * effort) {
+      result.push_back(j);
+    }
   }
+  return result;
+}
+
+// What makes a model that came out one of little use; empty where nothing does.
+std::string little_learned(const Commissioning& result, const Fit& fit) {
+  std::vector<std::string> reasons;
+  if (sees_nothing(result.validation)) {
+    reasons.emplace_back(
+        "no fault that scales the effort is certain to be seen on driving like this, since thresholds are as wide as "
+        "the efforts");
+  }
+  std::string open, wide;
   for (const ParameterResult& p : result.parameters) {
     if (p.lower_is_prior && p.upper_is_prior && p.excitation != identify::Excitation::not_excited) {
       open += (open.empty() ? "" : ", ") + p.parameter.name;
     }
   }
-  if (!open.empty()) {
-    text += fmt::format("{}bounds of {} are still those of the prior", text.empty() ? "" : ", and the ", open);
+  for (const std::size_t j : weighty(fit)) {
+    const ParameterResult& p = result.parameters[j];
+    if (relative_half_width(p) >= 1.0 && !(p.lower_is_prior && p.upper_is_prior)) {
+      wide += fmt::format("{}{} by ± {:.0f} %", wide.empty() ? "" : ", ", p.parameter.physical,
+                          100.0 * relative_half_width(p));
+    }
   }
-  return text;
+  if (!open.empty()) {
+    reasons.push_back(fmt::format("the bounds of {} are still those of the prior", open));
+  }
+  if (!wide.empty()) {
+    reasons.push_back(fmt::format("the bounds leave {} open", wide));
+  }
+  return fmt::format("{}", fmt::join(reasons, ", and "));
 }
 
 constexpr const char* kHowToDrive = "`wheelwright design --for bounds` plans such a drive";
@@ -513,24 +549,20 @@ std::string status_message(const Setting& s, const Commissioning& result) {
     }
   }
   switch (result.status) {
-    case Commissioning::Status::done: {
-      const std::string little = little_learned(result);
-      return (little.empty()
-                  ? "commissioned"
-                  : fmt::format("commissioned, but little was learned: {}; speed up and brake, drive curves "
-                                "to both sides ({}), and commission again, or declare smaller noise bounds where "
-                                "they hold",
-                                little, kHowToDrive)) +
+    case Commissioning::Status::done:
+      return (result.little.why.empty() ? "commissioned"
+                                        : fmt::format("little was learned: {}; {}", result.little.why,
+                                                      fmt::join(result.little.remedies, "; "))) +
              reservations(s, result);
-    }
-    case Commissioning::Status::partial: {
-      const std::string little = little_learned(result);
+    case Commissioning::Status::partial:
       return fmt::format(
-                 "commissioned, but {}the log says nothing about {}: {}, and commission again ({}); until then "
+                 "{}the log says nothing about {}: {}, and commission again ({}); until then "
                  "their bounds are those of the prior",
-                 little.empty() ? "" : "little was learned: " + little + "; ", missing, todo, kHowToDrive) +
+                 result.little.why.empty() ? "commissioned, but "
+                                           : fmt::format("little was learned: {}; {}; ", result.little.why,
+                                                         fmt::join(result.little.remedies, "; ")),
+                 missing, todo, kHowToDrive) +
              reservations(s, result);
-    }
     case Commissioning::Status::nothing: return "the log says nothing about any parameter: " + todo;
     case Commissioning::Status::empty: {
       const std::string why = withdrawal(result);
@@ -548,6 +580,68 @@ std::string status_message(const Setting& s, const Commissioning& result) {
     case Commissioning::Status::contradicted: return "no model: " + withdrawal(result);
   }
   return {};
+}
+
+// The widths of a set, relative to the estimates, of the parameters that matter: "mass ± 4.2 %, …".
+std::string widths_in_words(const Commissioning& result, const std::vector<std::size_t>& which, const Box& hull) {
+  std::vector<std::string> items;
+  for (const std::size_t j : which) {
+    const ParameterResult& p = result.parameters[j];
+    if (p.estimate && *p.estimate != 0.0) {
+      const double half = 0.5 * (hull.sides[j].upper - hull.sides[j].lower) / std::abs(*p.estimate);
+      items.push_back(fmt::format("{} ± {:.2g} %", p.parameter.physical, 100.0 * half));
+    }
+  }
+  return fmt::format("{}", fmt::join(items, ", "));
+}
+
+// What would bring more where little was learned, with the bounds that it would have left of this log.
+std::vector<std::string> remedies(LogSource& log, const Setting& s, const Commissioning& result, const Fit& fit,
+                                  const CommissionOptions& options) {
+  std::vector<std::string> list;
+  std::vector<std::size_t> which = weighty(fit);
+  const auto would_leave = [&](const Setting& other, const SignalErrors& errors) -> std::string {
+    const bounds::OutlierResult set = refined_set(log, other, Part::everything, errors, options.outliers).result;
+    return set.set.status == FeasibleSet::Status::nonempty ? widths_in_words(result, which, set.set.hull)
+                                                           : std::string();
+  };
+  if (s.noise_complete && s.measurement.changes == model::EffortChanges::between) {
+    Robot robot = s.robot;
+    robot.effort_changes = model::EffortChanges::at_samples;
+    robot.filter = {.order = s.filter.order, .alpha = s.filter.alpha, .beta = s.filter.beta};
+    const Setting at_samples = settle(log, robot,
+                                      {.filter_choice = {},
+                                       .folds = options.folds,
+                                       .noise_mode = options.noise_mode,
+                                       .confidence = options.confidence,
+                                       .progress = {}});
+    if (const std::string left = would_leave(at_samples, at_samples.declared); !left.empty()) {
+      list.push_back(fmt::format(
+          "where efforts {} samples, write `effort: {{changes: at_samples}}` into the robot file, which leaves {} of "
+          "this log",
+          s.measurement.hold == Hold::zero_order ? "change at the" : "are straight between two", left));
+    }
+  }
+  if (s.noise_complete) {
+    SignalErrors nothing_between = s.declared;
+    nothing_between.between_samples = false;
+    if (const std::string left = would_leave(s, nothing_between); !left.empty()) {
+      list.push_back(fmt::format(
+          "log at a higher rate than {:.3g} Hz, since what motion and efforts may do between two samples shrinks with "
+          "the step: down to {} at most",
+          1.0 / s.survey.median_step, left));
+    }
+  }
+  for (const std::size_t j : which) {
+    const model::Parameter& p = s.model.parameters[j];
+    if (!s.prior_declared[j] && relative_half_width(result.parameters[j]) >= 1.0) {
+      list.push_back(fmt::format("declare what is known of the {0}, `prior: {{{0}: [lower, upper]}}`", p.physical));
+      break;
+    }
+  }
+  list.push_back(fmt::format("speed up and brake, drive curves to both sides ({})", kHowToDrive));
+  list.emplace_back("declare smaller noise bounds where they hold");
+  return list;
 }
 
 Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionOptions& options) {
@@ -574,8 +668,10 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   result.rank = fit.squares.rank;
   result.condition = fit.squares.condition;
   result.contradictions = std::move(learnt.signals.contradictions);
+  result.premises = std::move(learnt.signals.premises);
   if (learnt.signals.timing) {
     result.effort_shift = learnt.signals.timing->delay;
+    result.effort_shift_told = told_shift(*learnt.signals.timing, s.survey.median_step);
   }
   result.feasible = std::move(bounded.result.set);
   result.dropped = std::move(bounded.result.dropped);
@@ -628,6 +724,9 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   }
   if (withdrawn(result)) {
     withdraw(result);
+  } else if (result.little.why = little_learned(result, fit); !result.little.why.empty()) {
+    tell(options, "looking for what would bring more", 0.95);
+    result.little.remedies = remedies(log, s, result, fit, options);
   }
   result.message = status_message(s, result);
   log.rewind();

@@ -17,6 +17,7 @@
 #include "commission/contradiction.hpp"
 #include "commission/kinematic.hpp"
 #include "commission/output_noise.hpp"
+#include "commission/premises.hpp"
 #include "commission/survey.hpp"
 #include "commission/validation.hpp"
 #include "core/log.hpp"
@@ -51,6 +52,12 @@ struct EarlierSet {
   std::vector<std::size_t> dropped;  ///< rows of the log whose instants it leaves out as outliers
 };
 
+/// Why little was learned from a log whose bounds hold all the same, and what would bring more.
+struct LittleLearned {
+  std::string why{};                    ///< empty: enough was learned
+  std::vector<std::string> remedies{};  ///< each by the name of its key or drive, with what it would bring
+};
+
 /// The result of commissioning.
 struct Commissioning {
   /// Status of the commissioning.
@@ -80,7 +87,10 @@ struct Commissioning {
   FoldOptions folds;
   double minimax = 0.0;  ///< where the set is empty: by how much the bounds n̄ on the effort would have to be
                          ///< raised for it not to be (those on the motion kept), up to 0.05 %; else 0
-  std::optional<double> effort_shift;            ///< s, by which the efforts seem late against the motion
+  std::optional<double> effort_shift;  ///< s, by which the efforts seem late against the motion
+  double effort_shift_told = 0.0;      ///< s, a shift beyond what is declared that would have been told
+  Premises premises;                   ///< what statistics say of constancy, offsets and friction
+  LittleLearned little;
   std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model
   Box prior;                                     ///< in which the set was sought
   filter::SignalErrors

@@ -23,12 +23,14 @@ struct LogContradiction {
     dry_friction,      ///< the efforts follow the sign of the motion, and the model has no dry friction
     prior_edge,        ///< the prior explains the log only with far larger noise
     estimate_outside,  ///< the estimate lies outside the set, with its whole interval
-    halves_disagree,   ///< the two halves of the log give different robots
+    halves_disagree,   ///< parts of the log give different robots
+    effort_offset,     ///< a joint's effort is off throughout, by more than is declared
+    friction_shape,    ///< the efforts hold friction of a shape that the model does not have
     held_out_outside,  ///< driving that was held out leaves the thresholds
   };
   Kind kind = Kind::effort_constant;
   bool withdraws = true;   ///< no model is published; false: a note beside a model
-  bool demotes = false;    ///< chance does not explain it, worst-case noise would: nothing is called guaranteed
+  bool demotes = false;    ///< chance does not explain it, worst-case noise might: nothing is called guaranteed
   std::string subject{};   ///< the parameter, column or output that it is about
   double value = 0.0;      ///< what was found: s, share, factor, or the parameter's unit
   double limit = 0.0;      ///< what it was compared with, same unit

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "commission/contradictions.hpp"
@@ -26,6 +27,17 @@ inline constexpr std::size_t kFewestInstants = 200;
   constexpr double kRiskOfWithdrawal = 1e-8;
   return core::student_quantile(1.0 - kRiskOfWithdrawal, std::max(freedom, 1.0));
 }
+
+/// A parameter as people know it.
+struct InWords {
+  std::string name, unit;
+  double scale = 1.0, offset = 0.0;
+  /// The quantity behind the entry `theta` of the parameter vector, in `unit`.
+  [[nodiscard]] double value(double theta) const { return scale * theta - offset; }
+};
+
+/// Parameter `j` of the setting's model: the physical quantity where the effort's unit is known, else the entry itself.
+[[nodiscard]] InWords in_words(const Setting& setting, std::size_t j);
 
 /// Appends wrapped angles, scattered stamps and constant efforts, read from the columns as they are.
 void find_raw_contradictions(LogSource& log, const Setting& setting, std::vector<LogContradiction>& out);

@@ -35,9 +35,18 @@ std::string_view to_string(LogContradiction::Kind kind) {
     case LogContradiction::Kind::prior_edge: return "prior_edge";
     case LogContradiction::Kind::estimate_outside: return "estimate_outside";
     case LogContradiction::Kind::halves_disagree: return "halves_disagree";
+    case LogContradiction::Kind::effort_offset: return "effort_offset";
+    case LogContradiction::Kind::friction_shape: return "friction_shape";
     case LogContradiction::Kind::held_out_outside: return "held_out_outside";
   }
   return "";
+}
+
+InWords in_words(const Setting& s, std::size_t j) {
+  const auto scales = physical_scales(s.robot, s.model);
+  const model::Parameter& p = s.model.parameters[j];
+  return scales ? InWords{p.physical, p.physical_unit, (*scales)[j].scale, (*scales)[j].offset}
+                : InWords{p.name, parameter_unit(s.robot, p)};
 }
 
 namespace {
@@ -234,20 +243,6 @@ void find_latency(const Setting& s, const std::optional<EffortTiming>& timing, s
        .next = shift_words(s, *timing)});
 }
 
-// A parameter as people know it: name, value and unit.
-struct InWords {
-  std::string name, unit;
-  double scale = 1.0, offset = 0.0;
-  [[nodiscard]] double value(double theta) const { return scale * theta - offset; }
-};
-
-InWords in_words(const Setting& s, std::size_t j) {
-  const auto scales = physical_scales(s.robot, s.model);
-  const model::Parameter& p = s.model.parameters[j];
-  return scales ? InWords{p.physical, p.physical_unit, (*scales)[j].scale, (*scales)[j].offset}
-                : InWords{p.name, parameter_unit(s.robot, p)};
-}
-
 void find_wrong_signs(const Setting& s, const Fit& fit, std::vector<LogContradiction>& out) {
   const auto instants = static_cast<double>(std::max<std::size_t>(fit.squares.instants, 1));
   const double effort = std::sqrt(fit.squares.weighted_tss / instants);
@@ -311,72 +306,6 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
        .next = "give the model `coulomb` (`parameters:` in the robot file)"});
 }
 
-// Least squares on each half of the log's rows.
-void find_uneven_halves(LogSource& log, const Setting& s, const Fit& fit, std::vector<LogContradiction>& out) {
-  const Eigen::VectorXd& bias = fit.choice.predicted_bias;  // of least squares, which depends on the driving
-  if (fit.choice.candidates.empty() || fit.choice.in_doubt || bias.size() == 0 || !bias.allFinite()) {
-    return;
-  }
-  const double biased = 2.0 * bias.cwiseAbs().maxCoeff();  // standard errors that two halves may differ by
-  const std::size_t middle = s.survey.rows / 2;
-  TorqueRows rows = make_rows(log, s, errors_of_fit(s));
-  const auto add_halves = [&](auto& halves) {
-    core::for_each_block(rows, [&](const RegressionBlock& block) {
-      const auto from = static_cast<std::size_t>(std::ranges::lower_bound(block.sample, middle) - block.sample.begin());
-      halves[0].add(block, 0, from);
-      halves[1].add(block, from, block.instants());
-    });
-  };
-  std::vector<identify::LeastSquares> sums(2, identify::LeastSquares(s.model.p(), fit.weights));
-  add_halves(sums);
-  if (std::min(sums[0].instants(), sums[1].instants()) < kFewestInstants) {
-    return;
-  }
-  std::vector<bool> excluded;
-  for (const identify::ExcitationFinding& finding : fit.excitation) {
-    excluded.push_back(finding.state == identify::Excitation::not_excited);
-  }
-  std::vector<identify::LeastSquaresFit> fits;
-  std::vector<identify::ResidualStatistics> statistics;
-  for (const identify::LeastSquares& sum : sums) {
-    fits.push_back(sum.solve(excluded));
-    statistics.emplace_back(fits.back().estimate, fit.weights);
-  }
-  add_halves(statistics);
-  std::vector<identify::ResidualSummary> residuals;
-  std::vector<std::vector<identify::ExcitationFinding>> excitation;
-  for (std::size_t half = 0; half < 2; ++half) {
-    residuals.push_back(statistics[half].summary(fits[half].inverse_gram));
-    excitation.push_back(
-        identify::judge_excitation(fits[half], residuals[half].standard_error,
-                                   core::student_quantile(0.95, std::max(residuals[half].freedom, 1.0))));
-  }
-  for (std::size_t j = 0; j < s.model.p(); ++j) {
-    const auto at = static_cast<Eigen::Index>(j);
-    const double a = fits[0].estimate[at], b = fits[1].estimate[at];
-    const double error = std::hypot(residuals[0].standard_error[at], residuals[1].standard_error[at]);
-    const bool shown = !excluded[j] && excitation[0][j].state != identify::Excitation::not_excited &&
-                       excitation[1][j].state != identify::Excitation::not_excited;
-    const double sure = (certain(std::min(residuals[0].freedom, residuals[1].freedom)) + biased) * error;
-    if (!shown || !(std::abs(a - b) > sure)) {
-      continue;
-    }
-    const InWords w = in_words(s, j);
-    const double half_a = 2.0 * std::abs(w.scale) * residuals[0].standard_error[at];
-    const double half_b = 2.0 * std::abs(w.scale) * residuals[1].standard_error[at];
-    out.push_back({.kind = Kind::halves_disagree,
-                   .withdraws = false,
-                   .subject = s.model.parameters[j].physical,
-                   .value = std::abs(a - b),
-                   .limit = sure,
-                   .sentence = fmt::format("the first half of the log gives {} {:.4g} ± {:.2g} {}, the second {:.4g} ± "
-                                           "{:.2g} {}",
-                                           w.name, w.value(a), half_a, w.unit, w.value(b), half_b, w.unit),
-                   .next = "the robot changed on the way (load, temperature, a fault), or the model lacks an effect: "
-                           "commission the halves by themselves, or let `gap` look at the log"});
-  }
-}
-
 }  // namespace
 
 SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit& fit) {
@@ -391,7 +320,7 @@ SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit
     find_wrong_signs(s, fit, found);
     find_dry_friction(log, s, found);
     find_uneven_efforts(s, joints, found);
-    find_uneven_halves(log, s, fit, found);
+    findings.premises = test_premises(log, s, fit, found);
   }
   log.rewind();
   return findings;

@@ -11,6 +11,7 @@
 
 #include "bounds/box.hpp"
 #include "commission/contradiction.hpp"
+#include "commission/premises.hpp"
 #include "core/interval.hpp"
 #include "core/log.hpp"
 #include "model/filter/noise.hpp"
@@ -53,14 +54,19 @@ struct EffortTiming {
 /// steps showed 0.09 steps at most.
 [[nodiscard]] bool is_latency(const EffortTiming& timing, double step);
 
+/// s, a constant shift beyond what is declared that is_latency() would tell nearly always, of `step` (s) and the
+/// uncertainty of `timing`.
+[[nodiscard]] double told_shift(const EffortTiming& timing, double step);
+
 /// Findings about the signals of a log, before any feasible set is computed.
 struct SignalFindings {
   std::vector<LogContradiction> contradictions;
   std::optional<EffortTiming> timing;  ///< nothing where no shift is told, or was not looked for
+  Premises premises;                   ///< not tested where the signals themselves are contradicted
 };
 
-/// Wrapped angles, constant and unrelated efforts; where there are none, timing, wrong signs, wheels and halves that
-/// disagree. Walks `log` a few times.
+/// Wrapped angles, constant and unrelated efforts; where there are none, timing, wrong signs, wheels that disagree, and
+/// premises that fail. Walks `log` a few times.
 [[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
 
 /// Contradictions within a finished commissioning: estimates outside their set, held-out rows outside the thresholds, a

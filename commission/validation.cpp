@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "commission/keep_instants.hpp"
 #include "core/check.hpp"
 #include "core/interval.hpp"
 #include "core/statistics.hpp"
@@ -32,9 +33,7 @@ bool FoldedSource::next(RegressionBlock& block) {
   if (part_ == Part::everything) {
     return true;
   }
-  const auto n = static_cast<Eigen::Index>(block.outputs);
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < block.instants(); ++k) {
+  keep_instants(block, [&](std::size_t k) {
     const std::size_t fold = block.sample[k] * options_.blocks / log_rows_;
     if (fold != current_) {
       current_ = fold;
@@ -42,24 +41,8 @@ bool FoldedSource::next(RegressionBlock& block) {
     }
     const bool held_out = fold % options_.hold_out_every == options_.hold_out_every - 1;
     const bool purged = fold > 0 && block.t[k] >= block_start_ && block.t[k] < block_start_ + options_.purge;
-    if (purged || held_out != (part_ == Part::held_out)) {
-      continue;
-    }
-    if (kept != k) {
-      const auto to = static_cast<Eigen::Index>(kept) * n;
-      const auto from = static_cast<Eigen::Index>(k) * n;
-      block.sample[kept] = block.sample[k];
-      block.t[kept] = block.t[k];
-      for (Eigen::Index i = 0; i < n; ++i) {
-        block.Y.row(to + i) = block.Y.row(from + i);
-        block.dY.row(to + i) = block.dY.row(from + i);
-        block.y[to + i] = block.y[from + i];
-        block.dy[to + i] = block.dy[from + i];
-      }
-    }
-    ++kept;
-  }
-  block.shorten(kept);
+    return !purged && held_out == (part_ == Part::held_out);
+  });
   return true;
 }
 

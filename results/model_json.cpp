@@ -535,6 +535,9 @@ Json to_json(const Commissioning& r, const logs::LogReport& data, const std::str
   json["contradictions"] = contradictions_json(r);
   json["data"] = data_json(r, data);
   json["assumptions"] = assumptions_json(r.assumptions);
+  if (!r.little.why.empty()) {
+    json["little_learned"] = {{"why", r.little.why}, {"remedies", r.little.remedies}};
+  }
   json["notes"] = r.notes;
   return json;
 }

@@ -20,6 +20,9 @@
 namespace wheelwright::commission {
 namespace {
 
+// Factor on the sums of a log's errors below which a violation would say nothing.
+constexpr double kToldSums = 10.0;
+
 // What a log makes of one assumption on its errors.
 struct Attempt {
   RiskSet set;
@@ -181,7 +184,7 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
       assumption.verdict = core::AssumptionVerdict::fails;
       assumption.detail = std::move(detail);
       result.notes.push_back(fmt::format(
-          "nothing is said at a stated risk, the worst case stands alone: {}; a larger `bias` or `correlation` of "
+          "nothing is said at a stated risk, and nothing is called guaranteed: {}; a larger `bias` or `correlation` of "
           "`noise: effort` in the robot file would allow for it",
           assumption.detail));
       attempt.set.set.reset();
@@ -206,6 +209,11 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
           model.model.joints.size() > 1 ? " of " + model.model.joints[serial.joint].torque : std::string(),
           serial.delay, serial.excess));
     } else {
+      const double used = std::max({attempt.utilisation, attempt.spread, serial.excess});
+      assumption.detail =
+          fmt::format("sums of what the model leaves use at most {:.0f} % of what such errors can make", 100.0 * used);
+      assumption.verdict =
+          kToldSums * used >= 1.0 ? core::AssumptionVerdict::holds : core::AssumptionVerdict::not_tested;
       model.at_risk = std::move(attempt.model);
     }
     result.at_risk = std::move(attempt.set);
@@ -232,6 +240,9 @@ void learn_at_risk(LogSource& log, Commissioning& result, const AtRiskOptions& o
   }
   result.assumptions.push_back(assumption);
   model.assumptions = result.assumptions;
+  if (assumption.verdict == core::AssumptionVerdict::fails) {
+    withdraw_what_averages_would_hide(result, assumption.detail);
+  }
 }
 
 }  // namespace wheelwright::commission

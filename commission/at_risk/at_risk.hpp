@@ -11,7 +11,8 @@
 
 namespace wheelwright::commission {
 
-/// Id of the assumption (core::Assumption) behind what is said at a risk. The guaranteed bounds do not stand on it.
+/// Id of the assumption (core::Assumption) behind what is said at a risk. The guaranteed bounds do not stand on it, but
+/// what makes it fail may be more than errors: see withdraw_what_averages_would_hide().
 inline constexpr const char* kNoiseAverages = "noise_averages";
 
 /// Options of learn_at_risk().

@@ -116,7 +116,7 @@ std::string commission_report(const Commissioning& result, const CommissionConte
   content.sentences = commission_words(result);
   content.first = context.seen ? outlook(*context.seen, result.model) : std::string();
   content.software = context.software;
-  if (result.status != Commissioning::Status::empty) {
+  if (result.status != Commissioning::Status::empty && result.little.why.empty()) {
     content.warrant = result.model.warrant;
   }
   content.sections = context.lead;

@@ -205,7 +205,7 @@ std::string parameter_table(const Commissioning& result, const TimeAxis& axis) {
       "</th><th scope=\"col\" class=\"n\">estimate</th><th scope=\"col\" class=\"n\">{}</th>{}"
       "<th scope=\"col\" class=\"n\">95 % statistical</th><th scope=\"col\" class=\"n\">centre</th>{}"
       "<th scope=\"col\">intervals</th><th scope=\"col\">bound set by</th></tr></thead><tbody>\n",
-      warrant_badge(commission::interval_warrant(result)),
+      result.little.why.empty() ? warrant_badge(commission::interval_warrant(result)) : "bounds",
       at_risk ? "<th scope=\"col\" class=\"n\">at a stated risk</th>" : "",
       with_nominal ? "<th scope=\"col\" class=\"n\">nominal</th>" : "");
   for (std::size_t j = 0; j < views.size(); ++j) {
@@ -314,7 +314,9 @@ std::string noise_section(const Commissioning& result) {
       largest = number(result.residuals.outputs[i].largest);
     }
     rows.push_back({unit_cell(result, i), numeric(number(n.bound)), numeric(number(n.learning)), numeric(rms),
-                    numeric(largest), warrant_badge(n.warrant) + "<small>" + escape(how) + "</small>"});
+                    numeric(largest),
+                    (result.little.why.empty() ? warrant_badge(n.warrant) : std::string()) + "<small>" + escape(how) +
+                        "</small>"});
   }
   if (rows.empty()) {
     return paragraph("No noise bound was reached.");

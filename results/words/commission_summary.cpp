@@ -29,8 +29,9 @@ std::string parameter_table(const Commissioning& r) {
   const Robot& robot = r.model.robot;
   const auto scales = commission::physical_scales(robot, r.model.model);
   const double t = core::student_quantile(0.95, std::max(r.residuals.freedom, 1.0));
-  std::string text = fmt::format("  {:<20} {:>11}   {} interval   ± 95 % statistical\n", "parameter", "estimate",
-                                 core::warrant_word(commission::interval_warrant(r)));
+  const bool little = !r.little.why.empty();
+  const std::string word = little ? "" : fmt::format("{} ", core::warrant_word(commission::interval_warrant(r)));
+  std::string text = fmt::format("  {:<20} {:>11}   {}interval   ± 95 % statistical\n", "parameter", "estimate", word);
   for (std::size_t j = 0; j < r.parameters.size(); ++j) {
     const commission::ParameterResult& p = r.parameters[j];
     const commission::PhysicalScale s = scales ? (*scales)[j] : commission::PhysicalScale{};
@@ -55,8 +56,8 @@ std::string parameter_table(const Commissioning& r) {
     text +=
         "  (physical values need the motor's constants in the robot file: motor: {torque_constant, gear_ratio, …})\n";
   }
-  text +=
-      fmt::format("  {}\n  {}\n", core::warrant_meaning(commission::interval_warrant(r)), core::statistical_remark());
+  text += fmt::format("  {}\n  {}\n", little ? little_meaning : core::warrant_meaning(commission::interval_warrant(r)),
+                      core::statistical_remark());
   if (r.at_risk && r.at_risk->set) {
     text += fmt::format("  {}\n", risk_remark(*r.at_risk));
   }
@@ -93,6 +94,11 @@ std::string assumption_lines(const std::vector<core::Assumption>& assumptions) {
   for (const core::Assumption& a : assumptions) {
     if (a.verdict == Verdict::fails) {
       text += fmt::format("    fails: {} {}\n", a.statement, a.detail);
+    }
+  }
+  for (const core::Assumption& a : assumptions) {
+    if (a.verdict == Verdict::not_tested && !a.detail.empty()) {
+      text += fmt::format("    not tested: {} ({})\n", a.statement, a.detail);
     }
   }
   return text;

@@ -180,8 +180,8 @@ std::vector<std::string> idle_outputs(const Commissioning& result) {
   return names;
 }
 
-std::string bounds_text(const ParameterView& v) {
-  const std::string word(core::warrant_word(v.warrant));
+std::string bounds_text(const ParameterView& v, bool little) {
+  const std::string word(little ? "bounds" : core::warrant_word(v.warrant));
   const auto [lower, upper] = outward(v.lower, v.upper);
   if (v.lower_is_prior && v.upper_is_prior) {
     return "bounded by the prior alone";
@@ -198,7 +198,8 @@ std::string estimates(const Commissioning& result) {
   for (std::size_t j = 0; j < views.size(); ++j) {
     const ParameterView& v = views[j].best();
     if (v.estimate && result.parameters[j].excitation != identify::Excitation::not_excited) {
-      items.push_back(with_unit(v.name + " " + estimate_text(v), v.unit) + " (" + bounds_text(v) + ")");
+      items.push_back(with_unit(v.name + " " + estimate_text(v), v.unit) + " (" +
+                      bounds_text(v, !result.little.why.empty()) + ")");
     }
   }
   if (physical_values_unknown(result)) {
@@ -209,6 +210,9 @@ std::string estimates(const Commissioning& result) {
 }
 
 std::string footing(const Commissioning& result) {
+  if (!result.little.why.empty()) {
+    return std::string(little_meaning);
+  }
   std::vector<std::string> declared, estimated, broken;
   for (std::size_t i = 0; i < result.noise.size(); ++i) {
     (result.noise[i].origin == core::NoiseOrigin::declared ? declared : estimated)
@@ -442,22 +446,24 @@ Standing standing(const Commissioning& result) {
   }
   const bool clean = result.status == Status::done && held_out_instants(result) > 0 && false_alarms(result) == 0 &&
                      commission::smallest_certain_kappa(result.validation).value_or(coarse_kappa) < coarse_kappa &&
-                     idle_outputs(result).empty();
+                     idle_outputs(result).empty() && result.little.why.empty() &&
+                     std::ranges::none_of(result.contradictions, &commission::LogContradiction::demotes);
   return clean ? Standing::good : Standing::caution;
 }
 
 std::string verdict(const Commissioning& result) {
-  const std::string instead =
-      commission::sees_nothing(result.validation)
-          ? " No fault is certain to be seen on driving like this: speed up and brake, drive curves to "
-            "both sides (`wheelwright design --for bounds` plans such a drive), and commission again."
-          : "";
+  const std::string instead = result.little.why.empty()
+                                  ? ""
+                                  : fmt::format("Little was learned: {}. What to do: {}.", result.little.why,
+                                                fmt::join(result.little.remedies, "; "));
+  if (!instead.empty() && result.has_model()) {
+    return instead;
+  }
   switch (result.status) {
     case Status::done:
       return standing(result) == Standing::good ? "Commissioned: the model can watch this robot."
-             : instead.empty()                  ? "Commissioned, with something to be read first."
-                                                : "Commissioned, but little was learned." + instead;
-    case Status::partial: return "Commissioned in part: the log does not show every parameter." + instead;
+                                                : "Commissioned, with something to be read first.";
+    case Status::partial: return "Commissioned in part: the log does not show every parameter.";
     case Status::empty: return "No model: the log contradicts the model within the declared noise.";
     case Status::nothing: return "No model: the log shows none of the parameters.";
     case Status::contradicted: return "No model: the log contradicts what a model takes for granted.";

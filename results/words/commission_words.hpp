@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "commission/commission.hpp"
@@ -42,6 +43,10 @@ struct ParameterViews {
 [[nodiscard]] std::string estimate_text(const ParameterView& view);
 /// The Chebyshev centre, in the same way; "–" where the log says nothing of the parameter.
 [[nodiscard]] std::string centre_text(const ParameterView& view);
+
+/// In the place of the warrant's meaning where little was learned.
+inline constexpr std::string_view little_meaning =
+    "Little was learned: the bounds hold while the assumptions listed hold, but are too wide to be of use.";
 
 /// Views of all parameters, in their order.
 [[nodiscard]] std::vector<ParameterViews> parameter_views(const Commissioning& result);
