@@ -272,7 +272,7 @@ TEST_P(LostRows, ArePassedOverAndNoRowIsWrong) {
   const Case c = GetParam();
   for (unsigned seed = 1; seed <= 2; ++seed) {
     const Outcome outcome = watch(c, seed);
-    const auto settling = c.motion == MotionKind::speed ? 2L : static_cast<long>(std::ceil(12.0 / (c.beta * c.h))) + 3;
+    const auto settling = c.motion == MotionKind::speed ? 2L : static_cast<long>(1.05 * std::ceil(12.0 / (c.beta * c.h))) + 3;
     EXPECT_GE(outcome.rows, outcome.given - settling) << words(c);
     EXPECT_EQ(outcome.beyond, 0) << words(c) << ": " << outcome.worst << " times the bound in the worst row of "
                                  << outcome.rows;
