@@ -216,8 +216,7 @@ void RegressorFilter::write_row() {
     const auto i = static_cast<Eigen::Index>(c);
     double error = errors.speed[i] + whole * errors.speed_sample[i];
     if (bounded) {
-      error += angles ? slope * slope_doubt_[c].value() + start * first_doubt_[c] +
-                            out[edge_doubt_ + c]
+      error += angles ? slope * slope_doubt_[c].value() + start * first_doubt_[c] + out[edge_doubt_ + c]
                       : out[motion_doubt_ + c];
     }
     error_[c] = error;
