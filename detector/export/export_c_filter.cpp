@@ -1029,7 +1029,8 @@ void FilterWriter::cut_out(Text& out) const {
   }
   if (interpolated_) {
     out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
-    out.line("    pfx_take(&m->edge_doubt[i], w, (e->run_begins ? m->doubt_before[i] : 0.0) + rate * e->motion_doubt[i]);");
+    out.line(
+        "    pfx_take(&m->edge_doubt[i], w, (e->run_begins ? m->doubt_before[i] : 0.0) + rate * e->motion_doubt[i]);");
     out.line("    m->doubt_before[i] = goes_on ? decay * m->doubt_before[i] + slope * e->motion_doubt[i] : 0.0;");
     out.line("  }}");
   }
@@ -1188,9 +1189,10 @@ void FilterWriter::filter(Text& out) const {
   if (nodes_) {
     out.line("  since = all->t - all->t0;");
     out.line("  return all->at_rest || since * PFX_BETA >= PFX_SETTLE{};",
-             restarted_ ? " ||\n         (all->after_loss && since * PFX_BETA >= 1.0 &&\n"
-                     "          pfx_value(&s->memory.start) / (PFX_GAIN * s->memory.first_length) <= PFX_SETTLED_START)"
-                   : "");
+             restarted_
+                 ? " ||\n         (all->after_loss && since * PFX_BETA >= 1.0 &&\n"
+                   "          pfx_value(&s->memory.start) / (PFX_GAIN * s->memory.first_length) <= PFX_SETTLED_START)"
+                 : "");
   } else {
     out.line("  return 1;");
   }
@@ -1265,7 +1267,10 @@ void FilterWriter::row(Text& out) const {
                             bridged_ ? fmt::format(" + pfx_value(&m->edge_doubt[{}])", term.coordinate) : "")
                       : fmt::format(" + pfx_value(&m->motion_doubt[{}])", term.coordinate);
     } else if (!speed && (first_error_ || cut_)) {
-      error += fmt::format(" + {} * {}", !cut_ ? "first" : first_error_ ? "(first + edge)" : "edge",
+      error += fmt::format(" + {} * {}",
+                           !cut_          ? "first"
+                           : first_error_ ? "(first + edge)"
+                                          : "edge",
                            hex(errors_.speed_sample[c]));
     } else if (constant == 0.0 && !cut) {
       continue;

@@ -375,11 +375,10 @@ std::string SumsWriter::left_out() const {
   if (!elements_.bridged()) {
     return "";
   }
-  const double size =
-      2.0 * risk_.errors.motion.bound * std::sqrt(static_cast<double>(model_.joints.size()));
+  const double size = 2.0 * risk_.errors.motion.bound * std::sqrt(static_cast<double>(model_.joints.size()));
   std::string text = "  memset(s->cut, 0, sizeof s->cut);\n  if (!e->known) {\n";
-  text += line("    const double by = {}{};", hex(size),
-               elements_.nodes() ? " * (1.0 / e->before + 1.0 / e->step)" : "");
+  text +=
+      line("    const double by = {}{};", hex(size), elements_.nodes() ? " * (1.0 / e->before + 1.0 / e->step)" : "");
   text += R"(    for (j = 0; j < PFX_SUMS; ++j) {
       double sum = s->c[0][j] * s->c[0][j];
       for (i = 1; i < PFX_CHANNELS; ++i) {

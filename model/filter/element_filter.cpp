@@ -80,8 +80,8 @@ ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors 
   }
   const bool odometry = model_.heading_used && measurement_.heading_column.empty();
   const bool angle = measurement_.motion == MotionKind::angle;
-  bridges_ = errors_.bridges && longest_ > 0.0 && (corrector_.empty() || !(corrector_.memory(0.5) > 0.0)) && (angle || !odometry) &&
-             !(angle && measurement_.effort_unsigned);
+  bridges_ = errors_.bridges && longest_ > 0.0 && (corrector_.empty() || !(corrector_.memory(0.5) > 0.0)) &&
+             (angle || !odometry) && !(angle && measurement_.effort_unsigned);
   element_.motion = element_.slope = element_.motion_doubt = element_.motion_doubt_before = speed_;
   element_.torque = element_.torque_doubt = output_zero;
   element_.functions.resize(functions_.size());

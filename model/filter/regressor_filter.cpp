@@ -11,12 +11,13 @@ namespace wheelwright::filter {
 namespace {
 
 // L2 norms: of the errors of the samples at an edge, per unit of the edge, over that of a whole row (statistical_norms()
-// for short steps). An edge within a step is (1, −1) times half of it, a soft one is less.
+// for short steps). Of speeds an edge is (1, −1) times half of it; that of angles, which is soft, is below 0.48 whatever
+// the steps.
 double roughness_per_edge(const FilterDesign& design, const Measurement& measurement) {
-  constexpr double kOfEdge = 0.71, kNewest = 0.68;
+  constexpr double kOfSoftEdge = 0.5, kOfEdge = 0.71, kNewest = 0.68;
   const double gain = std::pow(design.alpha, design.order), step = measurement.nominal_step;
   if (measurement.motion != MotionKind::speed) {
-    return kOfEdge / (kNewest * gain);
+    return kOfSoftEdge / (kNewest * gain);
   }
   return kOfEdge / (design.order == 1 || !(step > 0.0) ? gain : gain * std::sqrt(step / (4.0 * design.beta)));
 }
@@ -215,8 +216,7 @@ void RegressorFilter::write_row() {
     const auto i = static_cast<Eigen::Index>(c);
     double error = errors.speed[i] + whole * errors.speed_sample[i];
     if (bounded) {
-      error += angles ? slope * slope_doubt_[c].value() + start * first_doubt_[c] +
-                            out[edge_doubt_ + c]
+      error += angles ? slope * slope_doubt_[c].value() + start * first_doubt_[c] + out[edge_doubt_ + c]
                       : out[motion_doubt_ + c];
     }
     error_[c] = error;
