@@ -39,12 +39,26 @@ bool are_interleaved(const JointPublisher& a, const JointPublisher& b) {
   return changes >= fewest;
 }
 
+std::vector<std::string> joints_of(const BagColumn& column) {
+  std::vector<std::string> joints;
+  for (const std::string& field : column.fields) {
+    joints.push_back(joint_place(field)->second.front());
+  }
+  return joints;
+}
+
 }  // namespace
 
 bool is_caster(const std::string& plain) { return has_one_of(plain, {"caster", "castor", "swivel", "passive"}); }
 
 bool is_steering(const std::string& plain) {
   return has_one_of(plain, {"steer", "kingpin", "ackermann"}) && !is_caster(plain);
+}
+
+void JointChoice::say(std::string note) {
+  if (std::ranges::find(choice_.notes, note) == choice_.notes.end()) {
+    choice_.notes.push_back(std::move(note));
+  }
 }
 
 void JointChoice::tell_unnamed() {
@@ -106,7 +120,7 @@ void JointChoice::sort_out(bool wheels, std::vector<std::string>& right, std::ve
       std::erase_if(*side, odd);
       const std::string of = side == &right ? "r" : "l";
       for (const std::string& joint : gone) {
-        choice_.notes.push_back(fmt::format(
+        say(fmt::format(
             "{}: {} was left out beside {}: {}; --map \"omega_{}=velocity[{}]\" --map \"tau_{}=effort[{}]\" takes it",
             view_.topic->name, joint, core::listed(*side, " and "), why, of, joint, of, joint));
       }
@@ -132,8 +146,8 @@ void JointChoice::sort_out(bool wheels, std::vector<std::string>& right, std::ve
                           is_copy(*publishers[joint], other, joint);
                  });
         },
-        "it repeats the other to the last digit, effort too, as of one motor; where each carries its own part, name "
-        "both, as in tau_r=effort[ONE,OTHER]");
+        "it repeats the other to the last digit, effort too, as of one motor (where each carries a part of its own, "
+        "effort[JOINT]*2 is their sum)");
   }
 }
 
@@ -224,6 +238,14 @@ void JointChoice::settle(BagSource& source) {
   }
   leave_publishers(source, joints, publisher);
   refuse_twice(*publisher, joints);
+  for (const std::string side : {"r", "l"}) {
+    for (const BagColumn& column : source.columns) {
+      if (column.fields.size() > 1 && (column.name == "omega_" + side || column.name == "phi_" + side)) {
+        tell_apart(side, joints_of(column));
+        break;
+      }
+    }
+  }
   drop_columns(source, *publisher);
 }
 
