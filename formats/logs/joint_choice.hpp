@@ -47,6 +47,7 @@ class JointChoice {
   void tell_apart(const std::string& side, const std::vector<std::string>& joints);
   void refuse_twice(const JointPublisher& publisher, const std::vector<std::string>& joints) const;
   void drop_columns(BagSource& source, const JointPublisher& publisher);
+  [[nodiscard]] bool wants_efforts() const;
   [[nodiscard]] std::string uneven_words(const JointPublisher& publisher, std::size_t array) const;
   [[nodiscard]] std::string cure(const BagSource& source, const JointPublisher& publisher, std::size_t array) const;
   void leave_publishers(BagSource& source, const std::vector<std::string>& joints, const JointPublisher*& publisher);
