@@ -19,6 +19,7 @@ constexpr std::size_t kFewestRows = 5;  // of a second source
 constexpr double kLeastShare = 0.002;   // likewise
 constexpr double kAlternates = 0.3;     // steps over two rows against those over one
 constexpr double kTracksApart = 0.1;    // of a column's range, in the middle
+constexpr double kAboveNoise = 10.0;    // of the other rows' bends
 constexpr double kFollows = 0.3;        // steps inside the second source against those out of it
 constexpr double kSameContent = 0.35;   // of the rows that stand apart: of a constant source half, where it alternates
 constexpr double kSeldom = 0.02;        // of the rows: a number that the first source hardly takes
@@ -121,24 +122,38 @@ bool alternates(const std::vector<Telling>& columns, const std::vector<std::size
   return fine > 0 && 2 * votes >= fine && votes > 0;
 }
 
-// Whether the rows that stand apart make a track of their own.
+// Whether the rows that stand apart make a track of their own, and not merely more of the noise of the others.
 bool follow_each_other(const std::vector<Telling>& columns, const std::vector<std::size_t>& runs,
                        const std::vector<std::size_t>& found) {
+  std::vector<bool> near(runs.size(), false);
+  for (const std::size_t j : found) {
+    near[j - 1] = near[j] = near[j + 1] = true;
+  }
+  std::size_t votes = 0, fine = 0;
   for (const Telling& c : columns) {
     if (!c.fine) {
       continue;
     }
+    ++fine;
+    const auto at = [&](std::size_t j) { return (*c.values)[runs[j]]; };
     std::vector<double> inside, outside;
     for (std::size_t i = 1; i < found.size(); ++i) {
-      const double now = (*c.values)[runs[found[i]]];
-      inside.push_back(std::abs(now - (*c.values)[runs[found[i - 1]]]));
-      outside.push_back(std::abs(now - (*c.values)[runs[found[i] - 1]]));
+      inside.push_back(std::abs(at(found[i]) - at(found[i - 1])));
+      outside.push_back(std::abs(at(found[i]) - at(found[i] - 1)));
     }
-    if (!inside.empty() && median(std::move(inside)) < kFollows * median(std::move(outside))) {
-      return true;
+    double bends = 0.0, rows = 0.0;
+    for (std::size_t j = 1; j + 1 < runs.size(); ++j) {
+      if (!near[j]) {
+        bends += std::pow(at(j) - 0.5 * (at(j - 1) + at(j + 1)), 2);
+        rows += 1.0;
+      }
     }
+    const double off = median(std::move(outside));
+    votes += median(std::move(inside)) < kFollows * off && rows > 0.0 && off > kAboveNoise * std::sqrt(bends / rows)
+                 ? 1U
+                 : 0U;
   }
-  return false;
+  return votes > 0 && 2 * votes >= fine;
 }
 
 }  // namespace

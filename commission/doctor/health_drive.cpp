@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,7 @@ constexpr double kLatest = 0.5;           // s that a gyro or pose may lag or le
 constexpr double kShift = 0.05;           // s
 constexpr double kOutliers = 0.05;        // of the windows, that a pose which jumps may spoil
 constexpr double kTurnsAtAll = 0.05;      // rad in a window, root mean square
+constexpr double kOverCounts = 3.0;       // turning against that of a count of one wheel
 constexpr double kTurnedByWheels = 0.6;   // of the turning: a lag of a tenth of a period and slip of a half leave more
 constexpr double kNoiseAlone = -0.2;      // correlation of neighbouring windows: that of noise at their ends is -0.5
 constexpr double kSideways = 0.1;         // of the squared displacement
@@ -144,6 +146,20 @@ WheelTurns wheel_turns(const HealthView& view) {
   return {of(view.joints[0]), of(view.joints[1])};
 }
 
+// A count of the wheels' encoders, rad: the smallest step of their angles.
+double count_of(const HealthView& view) {
+  double count = 0.0;
+  for (const JointView& j : view.joints) {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 1; k < view.log->rows(); ++k) {
+      const double step = std::abs(j.angle != nullptr ? (*j.angle)[k] - (*j.angle)[k - 1] : (*j.speed)[k] * view.step);
+      least = step > 1e-9 ? std::min(least, step) : least;
+    }
+    count = std::max(count, std::isfinite(least) ? least : 0.0);
+  }
+  return count;
+}
+
 double value_at(const std::vector<double>& t, const std::vector<double>& values, const DriveWindow& w, double time) {
   const auto begin = t.begin() + static_cast<std::ptrdiff_t>(w.segment_first),
              end = t.begin() + static_cast<std::ptrdiff_t>(w.segment_last) + 1;
@@ -172,7 +188,8 @@ std::optional<double> turned_by_wheels(const HealthView& view, const WheelTurns&
     return std::nullopt;
   }
   centre(here);
-  if (rms(here) < kTurnsAtAll || neighbours_correlation(here) < kNoiseAlone) {
+  const double counted = kOverCounts * count_of(view) * view.robot.wheel_radius / view.robot.track_width;
+  if (rms(here) < std::max(kTurnsAtAll, counted) || neighbours_correlation(here) < kNoiseAlone) {
     return std::nullopt;
   }
   for (double shift = -kLatest; shift < kLatest + 0.5 * kShift; shift += kShift) {

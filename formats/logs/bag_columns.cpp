@@ -234,7 +234,7 @@ class Chooser {
       }
       known = true;
       std::vector<std::string> fields;
-      for (const std::string& joint : joints) {
+      for (const std::string& joint : driven_of(k, name, joints)) {
         fields.push_back(fmt::format("{}[{}]", array, joint));
       }
       const bool filled = std::ranges::all_of(fields, [&](const std::string& field) {
@@ -242,7 +242,7 @@ class Chooser {
                                      : std::ranges::count(view.elements, field) > 0;
       });
       if (filled) {
-        take(k, {name, std::move(fields), rule_of(array, joints), factor});
+        take(k, {name, fields, rule_of(array, fields), factor});
         named_.push_back(name);
         return;
       }
@@ -255,6 +255,19 @@ class Chooser {
           "no JointState names {}, which the robot file's columns say: {}; joints are chosen by their names",
           core::listed(joints), met.empty() ? "there is none" : "they name " + core::listed(met)));
     }
+  }
+
+  /// Those of the joints of a side that the data say are driven, beside those that the map names for the other side.
+  std::vector<std::string> driven_of(std::size_t k, const std::string& name, const std::vector<std::string>& joints) {
+    const bool is_right = name.ends_with("_r");
+    if (joints.size() == 1 || (!is_right && !name.ends_with("_l"))) {
+      return joints;
+    }
+    const auto other = options_.map.find(name.substr(0, name.size() - 1) + (is_right ? "l" : "r"));
+    const auto place = other == options_.map.end() ? std::nullopt : joint_place(split_factor(other->second).first);
+    std::vector<std::string> own = joints, beside = place ? place->second : std::vector<std::string>();
+    joints_of_topic(k).sort_out(true, is_right ? own : beside, is_right ? beside : own);
+    return own;
   }
 
   static BagColumn::Rule rule_of(std::string_view array, const std::vector<std::string>& joints) {
@@ -463,9 +476,6 @@ class Chooser {
       }
       if (of_side.size() > 1 && !is_named(side)) {
         tell_side(*view.topic, side, of_side, !wheels.empty());
-        if (!wheels.empty()) {
-          judged.tell_apart(side, of_side);
-        }
       }
     }
     const bool driven = !wheels.empty() || std::ranges::all_of(view.names, [](const std::string& name) {

@@ -39,12 +39,26 @@ bool are_interleaved(const JointPublisher& a, const JointPublisher& b) {
   return changes >= fewest;
 }
 
+std::vector<std::string> joints_of(const BagColumn& column) {
+  std::vector<std::string> joints;
+  for (const std::string& field : column.fields) {
+    joints.push_back(joint_place(field)->second.front());
+  }
+  return joints;
+}
+
 }  // namespace
 
 bool is_caster(const std::string& plain) { return has_one_of(plain, {"caster", "castor", "swivel", "passive"}); }
 
 bool is_steering(const std::string& plain) {
   return has_one_of(plain, {"steer", "kingpin", "ackermann"}) && !is_caster(plain);
+}
+
+void JointChoice::say(std::string note) {
+  if (std::ranges::find(choice_.notes, note) == choice_.notes.end()) {
+    choice_.notes.push_back(std::move(note));
+  }
 }
 
 void JointChoice::tell_unnamed() {
@@ -106,7 +120,7 @@ void JointChoice::sort_out(bool wheels, std::vector<std::string>& right, std::ve
       std::erase_if(*side, odd);
       const std::string of = side == &right ? "r" : "l";
       for (const std::string& joint : gone) {
-        choice_.notes.push_back(fmt::format(
+        say(fmt::format(
             "{}: {} was left out beside {}: {}; --map \"omega_{}=velocity[{}]\" --map \"tau_{}=effort[{}]\" takes it",
             view_.topic->name, joint, core::listed(*side, " and "), why, of, joint, of, joint));
       }
@@ -132,8 +146,8 @@ void JointChoice::sort_out(bool wheels, std::vector<std::string>& right, std::ve
                           is_copy(*publishers[joint], other, joint);
                  });
         },
-        "it repeats the other to the last digit, effort too, as of one motor; where each carries its own part, name "
-        "both, as in tau_r=effort[ONE,OTHER]");
+        "it repeats the other to the last digit, effort too, as of one motor (where each carries a part of its own, "
+        "effort[JOINT]*2 is their sum)");
   }
 }
 
@@ -224,6 +238,14 @@ void JointChoice::settle(BagSource& source) {
   }
   leave_publishers(source, joints, publisher);
   refuse_twice(*publisher, joints);
+  for (const std::string side : {"r", "l"}) {
+    for (const BagColumn& column : source.columns) {
+      if (column.fields.size() > 1 && (column.name == "omega_" + side || column.name == "phi_" + side)) {
+        tell_apart(side, joints_of(column));
+        break;
+      }
+    }
+  }
   drop_columns(source, *publisher);
 }
 
@@ -274,6 +296,9 @@ void JointChoice::drop_columns(BagSource& source, const JointPublisher& publishe
     const auto place = place_of(column);
     return place && 2 * publisher.uneven[array_of(place->first)] > publisher.order.size();
   };
+  if (const auto a = array_of("effort"); 2 * publisher.uneven[a] > publisher.order.size() && wants_efforts()) {
+    throw InputError(path_ + ": " + uneven_words(publisher, a) + cure(source, publisher, a));
+  }
   for (const BagColumn& column : all) {
     if (uneven(column)) {
       const std::string array = place_of(column)->first;
@@ -297,6 +322,15 @@ void JointChoice::drop_columns(BagSource& source, const JointPublisher& publishe
   }
 }
 
+// Whether efforts of wheels are read, and not by their places.
+bool JointChoice::wants_efforts() const {
+  return std::ranges::all_of(std::array<std::string, 2>{"tau_r", "tau_l"}, [&](const std::string& name) {
+    const auto mapped = options_.map.find(name);
+    const bool wanted = !options_.only || std::ranges::count(*options_.only, name) > 0;
+    return mapped != options_.map.end() ? joint_place(split_factor(mapped->second).first).has_value() : wanted;
+  });
+}
+
 std::string JointChoice::uneven_words(const JointPublisher& publisher, std::size_t a) const {
   return fmt::format("{}: message {} has {} number{} in {} for {} names ({}), as {} of the first {}: expected as many",
                      view_.topic->name, publisher.uneven_message[a], publisher.uneven_length[a],
@@ -308,11 +342,14 @@ std::string JointChoice::uneven_words(const JointPublisher& publisher, std::size
 std::string JointChoice::cure(const BagSource& source, const JointPublisher& publisher, std::size_t a) const {
   const std::string array = joint_arrays[a];
   std::string out = "; whose each number is cannot be known from the recording";
+  constexpr std::array<std::string_view, 3> columns = {"phi_", "omega_", "tau_"};
   std::vector<std::pair<std::string, std::string>> wheels;  // column, joint
-  for (const BagColumn& column : source.columns) {
-    const auto place = joint_place(column.fields.front());
-    if (place && place->first == array && column.fields.size() == 1) {
-      wheels.emplace_back(column.name, place->second.front());
+  for (const std::string side : {"r", "l"}) {
+    const auto own = std::ranges::find_if(source.columns, [&](const BagColumn& column) {
+      return column.fields.size() == 1 && column.name.ends_with("_" + side) && joint_place(column.fields.front());
+    });
+    if (own != source.columns.end()) {
+      wheels.emplace_back(std::string(columns[a]) + side, joints_of(*own).front());
     }
   }
   std::ranges::sort(wheels, {}, [&](const auto& wheel) {

@@ -34,9 +34,7 @@ class JointChoice {
   /// changes beside others that have one, repeat another to the last digit, or, unless they are `wheels` by their names,
   /// turn by less than a turn. Throws InputError where the joints are wheels of several robots that move.
   void sort_out(bool wheels, std::vector<std::string>& right, std::vector<std::string>& left);
-  /// Contradicts where the `joints` of a side ("r", "l") do not turn as one.
-  void tell_apart(const std::string& side, const std::vector<std::string>& joints);
-  /// Of a source whose columns are chosen: takes away angles (speeds) that stand still beside speeds (angles), and
+  /// Of a source whose columns are chosen: contradicts where wheels of a side do not turn as one; takes away angles (speeds) that stand still beside speeds (angles), and
   /// motion in arrays that are not as long as the names; excludes messages of a second publisher. Throws InputError as
   /// choose_bag_columns().
   void settle(BagSource& source);
@@ -45,8 +43,11 @@ class JointChoice {
   using Motions = std::map<std::string, JointMotion>;
 
   void take_one_robot(std::vector<std::string>& right, std::vector<std::string>& left, Motions& motions);
+  void say(std::string note);
+  void tell_apart(const std::string& side, const std::vector<std::string>& joints);
   void refuse_twice(const JointPublisher& publisher, const std::vector<std::string>& joints) const;
   void drop_columns(BagSource& source, const JointPublisher& publisher);
+  [[nodiscard]] bool wants_efforts() const;
   [[nodiscard]] std::string uneven_words(const JointPublisher& publisher, std::size_t array) const;
   [[nodiscard]] std::string cure(const BagSource& source, const JointPublisher& publisher, std::size_t array) const;
   void leave_publishers(BagSource& source, const std::vector<std::string>& joints, const JointPublisher*& publisher);

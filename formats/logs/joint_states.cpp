@@ -18,9 +18,9 @@ constexpr std::uint32_t most_joints = 10'000;
 constexpr double stretch = 0.5;  ///< s
 
 /// Reads CDR from front to back; every read past the end makes it bad.
-class Cdr {
+class MessageBytes {
  public:
-  explicit Cdr(std::string_view bytes)
+  explicit MessageBytes(std::string_view bytes)
       : body_(bytes.size() > 4 ? bytes.substr(4) : std::string_view()),
         swap_(bytes.size() > 4 && (bytes[1] == 0) == (std::endian::native == std::endian::little)),
         good_(bytes.size() > 4 && bytes[0] == 0 && (bytes[1] == 0 || bytes[1] == 1)) {}
@@ -96,7 +96,7 @@ bool is_joint_state(const RosDefinition& definition) {
 }
 
 bool read_joint_message(std::string_view cdr, JointMessage& message) {
-  Cdr in(cdr);
+  MessageBytes in(cdr);
   const auto seconds = in.number<std::int32_t>();
   const auto nanoseconds = in.number<std::uint32_t>();
   message.stamp = std::int64_t{seconds} * 1'000'000'000 + nanoseconds;

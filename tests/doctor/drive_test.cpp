@@ -30,6 +30,7 @@ struct Drive {
   bool front_wheels = false;    // wheel columns of wheels that do not show the turning
   bool pose = true, gyro = true, efforts = true;
   double inertia = kInertia;
+  double counts = 0.0;  // a turn of the encoders, whose angles stand in place of speeds
 };
 
 Robot robot() {
@@ -55,7 +56,8 @@ LogTable log_of(const Drive& d, unsigned seed) {
   };
   const auto u_at = [&](double t) { return d.sideways * std::sin(0.5 * t + p[4]); };
   LogTable log;
-  log.names = {"omega_r", "omega_l"};
+  log.names =
+      d.counts > 0.0 ? std::vector<std::string>{"phi_r", "phi_l"} : std::vector<std::string>{"omega_r", "omega_l"};
   for (const auto& [has, names] : {std::pair(d.efforts, std::vector<std::string>{"tau_r", "tau_l"}),
                                    {d.gyro, {"gyro_z"}},
                                    {d.pose, {"x", "y", "theta"}}}) {
@@ -69,7 +71,7 @@ LogTable log_of(const Drive& d, unsigned seed) {
       log.column(name).push_back(value);
     }
   };
-  double x = 0.0, y = 0.0, theta = 0.0, at = -d.lag;
+  double x = 0.0, y = 0.0, theta = 0.0, at = -d.lag, right = 0.0, left = 0.0;
   const double fine = 1e-3, e = 1e-4;
   for (std::size_t k = 0; static_cast<double>(k) < d.seconds * d.rate; ++k) {
     const double t = static_cast<double>(k) / d.rate;
@@ -84,6 +86,13 @@ LogTable log_of(const Drive& d, unsigned seed) {
     log.t.push_back(t);
     put("omega_r", (v + 0.5 * kTrack * shown - u_at(t)) / kRadius + d.wheel_noise * normal(random));
     put("omega_l", (v - 0.5 * kTrack * shown + u_at(t)) / kRadius + d.wheel_noise * normal(random));
+    if (d.counts > 0.0) {
+      const double c = 6.283185307179586 / d.counts;
+      right += (v + 0.5 * kTrack * shown - u_at(t)) / kRadius / d.rate;
+      left += (v - 0.5 * kTrack * shown + u_at(t)) / kRadius / d.rate;
+      put("phi_r", std::floor(right / c) * c);
+      put("phi_l", std::floor(left / c) * c);
+    }
     const double force = kMass * (v_at(t + e) - v_at(t - e)) / (2.0 * e) + 6.0 * v;
     const double moment = d.steered ? 0.0 : d.inertia * (w_at(t + e) - w_at(t - e)) / (2.0 * e) + 0.7 * w;
     put("tau_r", kRadius * (0.5 * force + moment / kTrack) + d.effort_noise * normal(random));
@@ -109,10 +118,11 @@ std::string evidence(const Drive& d, unsigned seed = 1) {
 TEST(DriveHealth, HonestDrivesPass) {
   for (unsigned seed = 1; seed <= 2; ++seed) {
     for (const double rate : {10.0, 50.0, 200.0}) {
-      for (const Drive& d : {Drive{}, Drive{.slip = 0.3}, Drive{.lag = 0.15}, Drive{.turning = 0.1},
-                             Drive{.turning = 0.0}, Drive{.pose_noise = 0.03}, Drive{.heading_offset = 0.7},
-                             Drive{.effort_noise = 0.5}, Drive{.wheel_noise = 0.3}, Drive{.pose = false},
-                             Drive{.gyro = false}, Drive{.turning = 0.02, .inertia = 0.3}}) {
+      for (const Drive& d :
+           {Drive{}, Drive{.slip = 0.3}, Drive{.lag = 0.15}, Drive{.turning = 0.1}, Drive{.turning = 0.0},
+            Drive{.pose_noise = 0.03}, Drive{.heading_offset = 0.7}, Drive{.effort_noise = 0.5},
+            Drive{.wheel_noise = 0.3}, Drive{.pose = false}, Drive{.gyro = false},
+            Drive{.turning = 0.15, .counts = 20.0}, Drive{.counts = 400.0}, Drive{.turning = 0.02, .inertia = 0.3}}) {
         Drive now = d;
         now.rate = rate;
         EXPECT_EQ(evidence(now, seed), "") << "rate " << rate << ", slip " << d.slip << ", lag " << d.lag
