@@ -540,7 +540,7 @@ void check_delay(const HealthView& view, LogSource& log, const commission::Setti
                        (std::abs(delay) > 3.0 * error && left < 0.95 && std::abs(delay) > 0.25 * view.step);
   const bool large = matters && std::abs(delay) > 0.75 * view.step;
   const bool latency = view.robot_given && commission::is_latency(*timing, view.step);
-  const double longest = std::ceil(1e4 * (delay + 5.0 * error)) / 1e4;
+  const double longest = std::ceil(1e4 * (delay + 5.0 * error + 0.5 * view.step)) / 1e4;
   const bool taken = view.robot_given && delay > 0.0 && longest <= kLongestTaken && s.measurement.delay == Interval{} &&
                      view.robot.effects.empty() && commission::is_latency(*timing, kTakenFrom * view.step);
   // Declared errors may allow for a step of it: commissioning weighs that.
