@@ -224,7 +224,8 @@ void settle_from_log(const Arguments& a, RobotWithOrigins& made) {
       made.origins["effort.hold"] = "efforts come half a step after the motion if they are held: they are measured";
     } else if (delay->taken) {
       robot.effort_delay = *delay->taken;
-      made.origins["effort.delay"] = fmt::format("0 to {:g} s: {}", delay->taken->upper, delay->sentence);
+      made.origins["effort.delay"] =
+          fmt::format("{:g} to {:g} s: {}", delay->taken->lower, delay->taken->upper, delay->sentence);
     }
   }
   if (health.clock) {

@@ -229,18 +229,19 @@ void find_latency(LogSource& log, const Setting& s, const Fit& fit, const std::o
                   std::vector<LogContradiction>& out) {
   if (s.robot.effort_delay_found) {
     const Interval taken = s.robot.effort_delay;
-    out.push_back({.kind = Kind::effort_timing,
-                   .withdraws = false,
-                   .demotes = true,
-                   .subject = s.measurement.effort_columns.front(),
-                   .value = taken.upper,
-                   .limit = 0.0,
-                   .sentence = fmt::format("the efforts come up to {:g} ms after the motion, which nobody declares: a "
-                                           "delay of {:g} to {:g} ms is taken in",
-                                           1e3 * taken.upper, 1e3 * taken.lower, 1e3 * taken.upper),
-                   .next = fmt::format("where it is known to lie there, `effort: {{delay: [{:g}, {:g}]}}` in the robot "
-                                       "file declares it; stamp efforts and motion by one clock for narrower bounds",
-                                       taken.lower, taken.upper)});
+    out.push_back(
+        {.kind = Kind::effort_timing,
+         .withdraws = false,
+         .demotes = true,
+         .subject = s.measurement.effort_columns.front(),
+         .value = taken.upper,
+         .limit = 0.0,
+         .sentence = fmt::format("the efforts come after the motion, which nobody declares: a delay of {:g} to {:g} "
+                                 "ms is taken in",
+                                 1e3 * taken.lower, 1e3 * taken.upper),
+         .next = fmt::format("where it is known to lie there, `effort: {{delay: [{:g}, {:g}]}}` in the robot "
+                             "file declares it; stamp efforts and motion by one clock for narrower bounds",
+                             taken.lower, taken.upper)});
   }
   if (!timing || !is_latency(*timing, s.survey.median_step)) {
     return;

@@ -66,7 +66,7 @@ void each_stretch(const ClockGrid& grid, Visit visit) {
   }
 }
 
-// ClockRate of the stamps by the grid's, less 1, over rows [first, last), with its standard error.
+// Rate of the stamps by the grid's, less 1, over rows [first, last), with its standard error.
 struct ClockRate {
   double off = 0.0, error = 0.0;
 };
@@ -205,7 +205,7 @@ MovedShare moved_share(const HealthView& view, const ClockGrid& grid) {
 }
 
 std::string clock_line(const EvenClock& clock) {
-  return fmt::format("`clock: {{step: {:.9g}, drift: {:.1g}}}`", clock.step, clock.drift);
+  return fmt::format("`clock: {{step: {:.9g}, drift: {:.2g}}}`", clock.step, 1.1 * clock.drift);
 }
 
 // Rows that are sent together have no times of their own.

@@ -15,7 +15,7 @@ namespace {
 constexpr double kLagLongest = 0.5;      // s, to either side
 constexpr double kLagBlock = 1.0;        // s, over which errors may depend on each other
 constexpr double kLagSure = 5.0;         // standard errors
-constexpr double kLagMatters = 0.5;      // of a step: less is within what a stamp says
+constexpr double kLagMatters = 1.0;      // of a step: speeds that are differenced are half of one late
 constexpr double kLagFits = 0.5;         // least share of the gyro's variation that the wheels must explain
 constexpr std::size_t kLagSmoothed = 2;  // rows to either side: interpolation averages what noise is left
 constexpr std::size_t kLagRows = 60000;  // looked at

@@ -121,8 +121,7 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds, bool sums
   if (measurement_.clock_drift > 0.0) {
     throw InputError(
         "export: the model is read by an even clock behind scattered stamps, which has no C form; expected a model "
-        "whose "
-        "`clock` has no drift, for times that the caller counts by himself");
+        "whose `clock` has no drift, for times that the caller counts by himself");
   }
   for (std::size_t k = 0; k < model_.terms.size(); ++k) {
     if (model_.terms[k].kind == Term::Kind::function) {

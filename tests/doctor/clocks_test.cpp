@@ -179,7 +179,7 @@ LogTable with_gyro(LogTable log, double lag, double drift, double noise_size) {
 TEST(Clocks, TheLagOfAGyroIsMeasured) {
   for (const double step : {0.02, 0.01, 0.002}) {
     for (const bool speeds : {true, false}) {
-      for (const double lag : {0.0, -0.02, 0.03, 0.08, 0.15}) {
+      for (const double lag : {0.0, -0.04, 0.03, 0.08, 0.15}) {
         const LogTable log = with_gyro(a_log({.step = step, .speeds = speeds}, scatters(1e-9)[0]), lag, 0.0, 0.003);
         std::vector<LogFinding> findings;
         check_gyro_delay(make_view(log, a_robot()), findings);
