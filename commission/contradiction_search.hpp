@@ -42,4 +42,8 @@ struct InWords {
 /// Appends wrapped angles, scattered stamps and constant efforts, read from the columns as they are.
 void find_raw_contradictions(LogSource& log, const Setting& setting, std::vector<LogContradiction>& out);
 
+/// What each joint's effort says by itself against the motion of all: Kind::effort_unrelated and Kind::wheels_disagree,
+/// not yet weighed against declared errors. Walks `log` twice.
+[[nodiscard]] std::vector<LogContradiction> contradictions_of_efforts(LogSource& log, const Setting& setting);
+
 }  // namespace wheelwright::commission

@@ -335,6 +335,15 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
 
 }  // namespace
 
+std::vector<LogContradiction> contradictions_of_efforts(LogSource& log, const Setting& s) {
+  std::vector<LogContradiction> found;
+  const std::vector<JointFit> joints = fit_joints(log, s);
+  find_unrelated_efforts(s, joints, found);
+  find_uneven_efforts(s, joints, found);
+  log.rewind();
+  return found;
+}
+
 SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit& fit) {
   SignalFindings findings;
   std::vector<LogContradiction>& found = findings.contradictions;

@@ -90,28 +90,6 @@ std::optional<RegressionBlock> rows_as_logged(LogSource& log, const Setting& s, 
   return rows.instants() < kFewestInstants ? std::nullopt : std::optional(std::move(rows));
 }
 
-// The sum over instants of |a|² − |b|², as a multiple of what is certain at a risk of 0.1 %: residuals of the outputs
-// at the instants that both know.
-double preference_of(const Shifted& a, const std::vector<std::size_t>& of_a, const Shifted& b,
-                     const std::vector<std::size_t>& of_b, Eigen::Index outputs) {
-  constexpr double kConfidence = 0.999;
-  identify::BlockSums differences(1);
-  double sum = 0.0;
-  for (std::size_t i = 0, j = 0; i < of_a.size() && j < of_b.size();) {
-    if (of_a[i] != of_b[j]) {
-      of_a[i] < of_b[j] ? ++i : ++j;
-      continue;
-    }
-    const double more = a.residual.segment(static_cast<Eigen::Index>(i++) * outputs, outputs).squaredNorm() -
-                        b.residual.segment(static_cast<Eigen::Index>(j++) * outputs, outputs).squaredNorm();
-    differences.add(Eigen::VectorXd::Constant(1, more));
-    sum += more;
-  }
-  const identify::LongRunCovariance seen = identify::long_run_covariance(differences);
-  const double error = std::sqrt(seen.matrix(0, 0));
-  return error > 0.0 ? sum / (error * core::student_quantile(kConfidence, std::max<double>(seen.freedom, 1.0))) : 0.0;
-}
-
 }  // namespace
 
 std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, const Fit& fit, double longest,
@@ -175,8 +153,8 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
   }
 }
 
-std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s, const Fit& fit, double delay,
-                                                double longest, std::size_t most_rows) {
+std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s, const Fit& fit, double longest,
+                                                std::size_t most_rows) {
   if (s.measurement.effort_unsigned) {
     return std::nullopt;
   }
@@ -185,33 +163,18 @@ std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s
     return std::nullopt;
   }
   try {
-    const identify::TimeShiftedRows filters(*rows, identify::TimeEffect::effort_lag, 0.0, longest);
-    const identify::TimeShiftedRows shifts(*rows, identify::TimeEffect::delay, -delay, std::max(longest, 2.0 * delay));
-    identify::VariableProjectionOptions options = filters.options();
+    const identify::TimeShiftedRows model(*rows, identify::TimeEffect::effort_lag, 0.0, longest);
+    identify::VariableProjectionOptions options = model.options();
     options.weights = fit.weights;
-    const identify::SeparableFit found = identify::variable_projection(filters, options);
+    const identify::SeparableFit found = identify::variable_projection(model, options);
     if (found.end != identify::SearchEnd::converged || found.state[0] != identify::ShapeState::identified) {
       return std::nullopt;
     }
-    const auto filtered = at_shift(filters, found.shape[0], fit.weights),
-               shifted = at_shift(shifts, delay, fit.weights);
-    if (!filtered || !shifted) {
-      return std::nullopt;
-    }
     return EffortSmoothing{.time_constant = found.shape[0],
-                           .standard_error = found.standard_error[0],
-                           .freedom = found.freedom,
-                           .preference = preference_of(*shifted, shifts.instants(), *filtered, filters.instants(),
-                                                       static_cast<Eigen::Index>(s.model.n()))};
+                           .error = 2.0 * found.standard_error[0] + 0.5 * s.survey.median_step};
   } catch (const InvalidArgument&) {
     return std::nullopt;  // segments shorter than six of the longest filter
   }
-}
-
-double told_shift(const EffortTiming& timing, double step) {
-  constexpr double kNearlyAlways = 2.0;  // standard errors
-  return std::max(kLeastShift * step, certain(timing.freedom) * timing.standard_error) +
-         kNearlyAlways * timing.standard_error;
 }
 
 bool is_latency(const EffortTiming& timing, double step) {

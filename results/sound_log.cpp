@@ -28,7 +28,8 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
   std::vector<std::string> names;
   for (const doctor::LogFinding& finding : health.findings) {
     if (!finding.is_refusal()) {
-      if (finding.id == "units.effort") {  // a wrong scale of the efforts is one of all that is found
+      // A wrong scale of the efforts is one of all that is found.
+      if (finding.id == "units.effort" || finding.id == "signals.wheels_disagree") {
         out.remarks.push_back(fmt::format("{}: {} {}", finding.id, finding.sentence, finding.next));
       }
       continue;

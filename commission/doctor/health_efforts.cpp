@@ -101,7 +101,7 @@ LogTable without(const HealthView& view, std::span<const Frozen> stretches) {
 }
 
 // Mean over the outputs of the squared residual at each instant, each output over its own scale; of outputs whose
-// inertia the fit knows, and what is beyond the doubt of the fit.
+// parameters the fit knows, and what is beyond the doubt of the fit.
 struct Residuals {
   std::vector<std::size_t> sample;
   std::vector<double> by_rest;    // scale: the residual's root mean square in the rest
@@ -113,11 +113,12 @@ Residuals residuals_of(const LogTable& log, const commission::Setting& s, const 
   TorqueRows rows = commission::make_rows(source, s, commission::errors_of_fit(s));
   Residuals out;
   const std::size_t n = s.model.n();
-  std::vector<bool> known(n, false);
+  std::vector<bool> known(n, true);
   for (const Term& term : s.model.terms) {
+    const identify::Excitation seen = fit.excitation[term.parameter].state;
     known[term.output] =
-        known[term.output] || (term.kind == Term::Kind::acceleration &&
-                               fit.excitation[term.parameter].state == identify::Excitation::identified);
+        known[term.output] && (term.kind == Term::Kind::acceleration ? seen == identify::Excitation::identified
+                                                                     : seen != identify::Excitation::not_excited);
   }
   core::for_each_block(rows, [&](const RegressionBlock& block) {
     const Eigen::VectorXd error = block.y - block.Y * fit.estimate;
@@ -161,6 +162,23 @@ double worst_window(const std::vector<double>& values, std::size_t length) {
   return worst;
 }
 
+// Rows at which all joints have moved for as long as the filter delays: at rest dry friction takes any value.
+std::vector<bool> all_moving(const HealthView& view, double delay) {
+  constexpr double kSlow = 0.05;  // of a joint's top speed
+  std::vector<bool> moving(view.log->rows(), false);
+  const std::vector<double>& t = view.log->t;
+  for (const auto& [first, last] : view.segments) {
+    double rested = first < last ? t[first] - 2.0 * delay : 0.0;
+    for (std::size_t k = first; k < last; ++k) {
+      const bool slow =
+          std::ranges::any_of(view.joints, [&](const JointView& j) { return std::abs(j.smooth[k]) <= kSlow * j.top; });
+      rested = slow ? t[k] : rested;
+      moving[k] = t[k] - rested > delay;
+    }
+  }
+  return moving;
+}
+
 struct Judged {
   std::vector<Frozen> frozen;
   double worst_ratio = 0.0;  // root mean square of the residual in a frozen stretch, over that of the rest
@@ -181,6 +199,7 @@ Judged judge(const HealthView& view, const std::vector<Frozen>& standing) {
   const std::vector<double> usual = residuals_of(rest, s, fit).by_rest;
   const Residuals all = residuals_of(*view.log, s, fit);
   const std::vector<double>& t = view.log->t;
+  const std::vector<bool> moving = all_moving(view, s.filter.delay());
   Judged judged;
   for (const Frozen& f : standing) {
     std::vector<double> by_rest, by_effort;
@@ -191,7 +210,7 @@ Judged judge(const HealthView& view, const std::vector<Frozen>& standing) {
       if (row >= f.run.last && !(t[row] - t[f.run.last - 1] < s.filter.delay() && t[row] > t[f.run.last - 1])) {
         break;
       }
-      if (view.moving[row]) {
+      if (moving[row]) {
         by_rest.push_back(all.by_rest[k]);
         by_effort.push_back(all.by_effort[k]);
       }

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "commission/contradiction_search.hpp"
 #include "commission/contradictions.hpp"
 #include "commission/doctor/health_efforts.hpp"
 #include "commission/doctor/log_health.hpp"
@@ -514,18 +515,6 @@ bool check_excitation(const HealthView& view, LogSource& log, const commission::
   return true;
 }
 
-// Of efforts that come late.
-std::string smoothing_words(const commission::EffortSmoothing& filter) {
-  const std::string told = fmt::format("a first-order low-pass filter of {:.2g} ± {:.1g} s (95 %)",
-                                       filter.time_constant, 2.0 * filter.standard_error);
-  return filter.preference > 1.0    ? fmt::format(" They are smoothed: {} explains the log better than a shift.", told)
-         : filter.preference < -1.0 ? " They are late, not smoothed: a shift explains the log better than a filter."
-                                    : fmt::format(
-                                          " Smoothed efforts look like that, too: {}; the log does not tell "
-                                          "which.",
-                                          told);
-}
-
 // Effort against motion in time, where a shift explains the log better than none.
 void check_delay(const HealthView& view, LogSource& log, const commission::Setting& s, const commission::Fit& fit,
                  std::vector<LogFinding>& out) {
@@ -578,18 +567,16 @@ void check_delay(const HealthView& view, LogSource& log, const commission::Setti
   const double half = delay / view.step;
   const bool held = matters && s.measurement.hold == Hold::first_order && std::abs(half + 0.5) < 0.2;
   const bool measured = matters && s.measurement.hold == Hold::zero_order && std::abs(half - 0.5) < 0.2;
-  const std::optional<commission::EffortSmoothing> filter = matters && timing->delay > timing->allowed.upper
-                                                                ? commission::effort_smoothing(log, s, fit, delay)
-                                                                : std::nullopt;
-  if (filter) {
-    f.sentence += smoothing_words(*filter);
+  if (matters && timing->delay > timing->allowed.upper) {
+    if (const auto filter = commission::effort_smoothing(log, s, fit)) {
+      f.sentence += fmt::format(
+          " Efforts that a first-order low-pass filter of {:.2g} ± {:.1g} s smooths before they are logged look like "
+          "that, too.",
+          filter->time_constant, filter->error);
+    }
   }
-  const bool smoothed = filter && filter->preference > 1.0;
-  f.next = smoothed ? "Log efforts as they are before they are smoothed; or declare what the filter comes to for slow "
-                      "motion, `effort: {delay: [lo, hi]}` in the robot file, with a range that holds its time "
-                      "constant."
-           : held   ? "That is half a step: the efforts look like commands that are held. Set effort.hold to "
-                      "zero_order in the robot file."
+  f.next = held       ? "That is half a step: the efforts look like commands that are held. Set effort.hold to "
+                        "zero_order in the robot file."
            : measured ? "That is half a step: the efforts look measured. Set effort.hold to first_order in the "
                         "robot file."
            : large    ? "Stamp both with one clock where they are measured; where they are, the actuator or a "
@@ -606,6 +593,26 @@ void check_delay(const HealthView& view, LogSource& log, const commission::Setti
                          range.upper, f.next);
   }
   out.push_back(f);
+}
+
+// What commissioning holds against the effort of one joint; with declared noise it weighs that, and may drop it.
+void check_single_efforts(LogSource& log, const commission::Setting& s, std::vector<LogFinding>& out) {
+  for (const commission::LogContradiction& c : commission::contradictions_of_efforts(log, s)) {
+    if (!c.withdraws) {
+      continue;
+    }
+    const bool unrelated = c.kind == commission::LogContradiction::Kind::effort_unrelated;
+    LogFinding f{.id = unrelated ? "signals.effort_unrelated" : "signals.wheels_disagree",
+                 .topic = FindingTopic::signals,
+                 .severity = s.noise_complete ? FindingSeverity::warning : FindingSeverity::fatal};
+    f.refuses = unrelated;
+    f.sentence = core::capital(c.sentence) + ".";
+    f.next = core::capital(c.next) + ".";
+    f.columns = unrelated ? std::vector{c.subject} : s.measurement.effort_columns;
+    f.value = c.value;
+    f.unit = std::string("1");
+    out.push_back(f);
+  }
 }
 
 void check_remainder(const commission::Setting& s, const commission::Fit& fit, std::vector<LogFinding>& out) {
@@ -647,6 +654,7 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
       check_mirrored(view, s, fit, findings);
       check_remainder(s, fit, findings);
       check_delay(view, log, s, fit, findings);
+      check_single_efforts(log, s, findings);
     }
     return excited;
   } catch (const Error& error) {

@@ -129,6 +129,7 @@ void check_stuck(const HealthView& view, const Column& c, const std::vector<Run>
                         fmt::format("{} is {:.6g} in every row.", c.name, low),
                         needed ? "Check that the sensor is connected and that the right column is read (--map)." : "",
                         low, ""));
+    out.back().refuses = c.kind == ColumnKind::effort && std::ranges::count(view.moving, true) > 0;
     return;
   }
   std::vector<bool> flagged(view.log->rows(), false);
