@@ -134,7 +134,7 @@ std::optional<EncoderFinding> search(std::span<const double> speeds, double step
     const bool dense = different >= kFewestOfAll && most <= kDense * static_cast<double>(different);
     const double apart = std::abs(counts - whole_counts(counts, doubt));
     const bool in_a_row = most == static_cast<double>(different);  // one count, two, three
-    const double sharp = different == 1 ? 0.5 * kSharp : in_a_row ? std::clamp(doubt, kSharp, 10.0 * kSharp) : kSharp;
+    const double sharp = different == 1 ? 0.8 * kSharp : in_a_row ? std::clamp(doubt, kSharp, 10.0 * kSharp) : kSharp;
     if (many    ? rounding < kMostRounding
         : dense ? rounding < kLittleRounding && apart <= std::max(doubt, kSharp)
                 : rounding < kSharp && apart < sharp && (different > 1 || divisor == 1)) {
