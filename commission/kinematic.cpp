@@ -110,7 +110,8 @@ Frame settle(LogSource& log, const Robot& robot, const filter::OdometryMeasureme
                                           robot.noise.wheel_angle.value || robot.encoder_counts_per_turn);
   const bool heading = declared_motion && robot.noise.heading.value;
   const bool position = heading && robot.noise.position.value;
-  const bool gyro = declared_motion && m.gyro && robot.noise.gyro.value;
+  // Four times what samples show bounds nothing of use for a rate between samples.
+  const bool gyro = declared_motion && m.gyro && robot.noise.gyro.value && robot.limits.contains("acceleration");
   for (const std::string& output : m.outputs()) {
     s.is_declared.push_back(output == "yaw" ? heading : output == "gyro_yaw" ? gyro : position);
   }

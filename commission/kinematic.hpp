@@ -83,7 +83,8 @@ struct KinematicCommissionOptions {
 ///
 /// Noise: where position and heading (the latter suffices for the output yaw) and the motion (noise_budget.hpp) are
 /// declared, bounds are the sensors', derived as OdometryFilter states, with the largest acceleration that the log
-/// shows for what happens between samples. Elsewhere, and for the gyro, ē is extrapolated from the residuals. Where
+/// shows for what happens between samples; of the gyro, where its noise and `limits: acceleration` are declared.
+/// Elsewhere ē is extrapolated from the residuals. Where
 /// nothing explains the log within the declared noise (wheels slip a little in every turn, the pose's point is off the
 /// axle, its clock is late), all outputs fall back to the extrapolated bound, and the message says so. Throws
 /// InvalidArgument for options out of range.

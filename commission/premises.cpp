@@ -75,7 +75,7 @@ Widened widened_for_premises(const Setting& s, const Fit& fit) {
     }
   }
   const auto joints = static_cast<std::size_t>(m.input.cols());
-  const auto add = [&](const char* name) {
+  const auto add = [&](const std::string& name) {
     m.parameters.push_back(
         {.name = name, .unit = {}, .physical = name, .physical_unit = {}, .prior = {}, .excite = {}});
     return m.p() - 1;
@@ -95,7 +95,7 @@ Widened widened_for_premises(const Setting& s, const Fit& fit) {
   };
   if (!has_constant(s.model)) {
     for (std::size_t joint = 0; joint < joints; ++joint) {
-      const std::size_t at = add("effort offset");
+      const std::size_t at = add(fmt::format("effort offset of joint {}", joint + 1));
       w.offsets.push_back(static_cast<Eigen::Index>(at));
       add_term(at, joint, model::TermShape::constant);
     }

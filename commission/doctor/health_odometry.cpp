@@ -160,27 +160,33 @@ Alignment alignment(const std::vector<Window>& windows, double scale) {
 }
 
 // Angle from the logged heading (scale·theta) to the direction in which the wheels drive, counterclockwise, with its
-// standard error: displacements in the frame of the heading are a complex multiple of what the wheels rolled, and a
-// point off the axle adds one of what the heading turned. Nothing where the wheels hardly roll.
+// standard error: displacements, step by step in the frame of the heading, add up to a complex multiple of what the
+// wheels rolled, and a point off the axle adds one of what the heading turned. Nothing where the wheels hardly roll.
 struct DrivingDirection {
   double offset = 0.0, error = 0.0;
 };
 
-std::optional<DrivingDirection> driving_direction(const std::vector<Window>& windows, double scale) {
+std::optional<DrivingDirection> driving_direction(const HealthView& view, const std::vector<Window>& windows,
+                                                  double scale) {
   const auto n = static_cast<Eigen::Index>(windows.size());
   if (windows.size() < kFewest) {
     return std::nullopt;
   }
   Eigen::MatrixX2cd rolled(n, 2);
   Eigen::VectorXcd moved(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
+  const std::vector<double>&x = *view.column("x"), &y = *view.column("y"), &theta = *view.column("theta");
+  Eigen::Index i = 0;
+  each_window(view, [&](std::size_t a, std::size_t b) {
     const Window& w = windows[static_cast<std::size_t>(i)];
-    // The chord of an arc is shorter than the arc, and turned by half of what the robot turned.
-    const double half = 0.5 * scale * w.heading;
-    rolled(i, 0) = w.along() * (std::abs(half) > 1e-6 ? std::sin(half) / half : 1.0);
-    rolled(i, 1) = std::complex<double>(0.0, 2.0 * std::sin(half));
-    moved[i] = std::polar(1.0, -scale * w.middle) * std::complex<double>(w.x, w.y);
-  }
+    rolled(i, 0) = w.along();
+    rolled(i, 1) = std::complex<double>(0.0, scale * w.heading);
+    moved[i] = 0.0;
+    for (std::size_t k = a + 1; k <= b; ++k) {
+      moved[i] += std::polar(1.0, -0.5 * scale * (theta[k] + theta[k - 1])) *
+                  std::complex<double>(x[k] - x[k - 1], y[k] - y[k - 1]);
+    }
+    ++i;
+  });
   const Eigen::Matrix2cd gram = rolled.adjoint() * rolled;
   const double along = gram(0, 0).real(), turn = gram(1, 1).real();
   if (!(along > 0.01 * turn) || !(along > 0.0)) {
@@ -577,7 +583,7 @@ std::optional<double> check_heading(const HealthView& view, std::vector<LogFindi
   }
   const std::vector<Window> windows = windows_of(view);
   const double scale = heading_scale(windows);
-  const auto found = driving_direction(windows, scale);
+  const auto found = driving_direction(view, windows, scale);
   if (!found || std::abs(scale) != 1.0 || alignment(windows, scale).quality < kAligned ||
       std::abs(found->offset) < kTurnedHeading + kTurnedErrors * found->error) {
     return std::nullopt;
