@@ -211,8 +211,12 @@ class FreeRows final : public identify::SeparableModel {
   double third_;
 };
 
-// Whether the rows tell `best` from a constant shift: by Wald's test of c₂ = c₁²/2 in the model that has both.
-bool told_from_shift(const BandRows& rows, const Tried& best, const Eigen::VectorXd& weights) {
+// What the rows tell of a filter and a constant shift.
+enum class Told { neither, filter, shift };
+
+// Wald's test of both laws, c₂ = c₁²/2 of a shift and that of `best`, in the model that has c₁ and c₂ free.
+Told told_apart(const BandRows& rows, const Tried& best, const Eigen::VectorXd& weights) {
+  constexpr double kMuchNearer = 3.0;  // where neither law holds exactly
   const Series series = series_of(best.candidate, best.fit.shape[0], rows.step);
   identify::VariableProjectionOptions options;
   options.start.resize(2);
@@ -222,14 +226,21 @@ bool told_from_shift(const BandRows& rows, const Tried& best, const Eigen::Vecto
   const identify::SeparableFit fit = identify::variable_projection(FreeRows(rows, series.c[2]), options);
   if (fit.end != identify::SearchEnd::converged || fit.state[0] != identify::ShapeState::identified ||
       fit.state[1] != identify::ShapeState::identified) {
-    return false;
+    return Told::neither;
   }
-  const double c = fit.shape[0], off = fit.shape[1] - 0.5 * c * c;
+  const double c = fit.shape[0];
   const auto& covariance = fit.covariance;
-  const double variance = covariance(1, 1) - 2.0 * c * covariance(0, 1) + c * c * covariance(0, 0);
-  const double own = fit.shape[1] - series.c[1];  // and nearer to the filter than to the shift
-  return std::abs(off) > core::student_quantile(1.0 - kFilterRisk, std::max(fit.freedom, 1.0)) * std::sqrt(variance) &&
-         std::abs(own) < std::abs(off);
+  const auto error = [&](double slope) {
+    return std::sqrt(covariance(1, 1) - 2.0 * slope * covariance(0, 1) + slope * slope * covariance(0, 0));
+  };
+  const double certain = core::student_quantile(1.0 - kFilterRisk, std::max(fit.freedom, 1.0));
+  const double of_shift = std::abs(fit.shape[1] - 0.5 * c * c);
+  const double slope = series.by[0] != 0.0 ? series.by[1] / series.by[0] : 0.0;
+  const double of_filter = std::abs(fit.shape[1] - series.c[1] - slope * (c - series.c[0]));
+  const bool no_shift = of_shift > certain * error(c), no_filter = of_filter > certain * error(slope);
+  return no_shift && kMuchNearer * of_filter < of_shift    ? Told::filter
+         : no_filter && kMuchNearer * of_shift < of_filter ? Told::shift
+                                                           : Told::neither;
 }
 
 model::SpeedFilter filter_of(LowPass candidate) {
@@ -257,7 +268,7 @@ Interval interval_about(const model::SpeedFilter& filter, bool exact, double tim
 // What explains rows best.
 struct Found {
   Tried best, shift, mean;
-  bool told = false;
+  Told told = Told::neither;
 };
 
 std::optional<Found> find_low_pass(const BandRows& rows, const Eigen::VectorXd& weights) {
@@ -275,7 +286,7 @@ std::optional<Found> find_low_pass(const BandRows& rows, const Eigen::VectorXd& 
       best = std::move(*tried);
     }
   }
-  const bool told = told_from_shift(rows, best, weights);
+  const Told told = told_apart(rows, best, weights);
   return Found{std::move(best), std::move(*shift), std::move(*mean), told};
 }
 
@@ -335,7 +346,10 @@ std::optional<SpeedSmoothing> speed_smoothing(LogSource& log, const Setting& s, 
       return std::nullopt;
     }
     SpeedSmoothing out;
-    out.told = found->told;
+    if (found->told == Told::shift) {
+      return std::nullopt;
+    }
+    out.told = found->told == Told::filter;
     out.delay = found->shift.fit.shape[0];
     for (std::size_t j = 0; j < s.model.p(); ++j) {
       if (fit.excitation[j].state == identify::Excitation::identified) {
@@ -360,8 +374,11 @@ std::optional<SpeedSmoothing> speed_smoothing(LogSource& log, const Setting& s, 
       const auto [late, error] = lateness(by_gyro->best, step);
       const auto [of_efforts, its_error] = lateness(found->best, step);
       if (std::abs(late - of_efforts) < certain * std::hypot(error, its_error) + kClockSlack * step) {
+        if (by_gyro->told == Told::shift) {
+          return std::nullopt;
+        }
         out.gyro_agrees = true;
-        if (by_gyro->told) {
+        if (by_gyro->told == Told::filter) {
           out.told = true;
           taken = &by_gyro->best;
         }

@@ -15,8 +15,10 @@ namespace {
 constexpr double kLeastCounts = 10.0;   // that the top speed makes in the span of a difference
 constexpr double kLeastSpan = 0.02;     // s, of a difference of angles
 constexpr double kSlowest = 0.1;        // of the top speed: slower is a reversal or rest
-constexpr double kLongestDip = 0.6;     // s below it, between two stretches of a drive that goes on
-constexpr double kShortestPiece = 0.3;  // s
+constexpr double kLongestDip = 0.6;     // s of a touch, between two stretches of a drive that goes on
+constexpr double kShortestPiece = 0.2;  // s
+constexpr double kDip = 0.25;           // of the top speed: slower is a touch of zero
+constexpr double kTimesLess = 3.0;      // unexplained without these signs over unexplained with them
 constexpr double kExplained = 0.8;      // share of the efforts that motion with a sign for each stretch must explain
 constexpr std::size_t kLeastReversals = 3;  // reversals
 constexpr double kUsualChange = 0.95;       // quantile of changes from row to row
@@ -113,71 +115,102 @@ std::vector<std::size_t> jumps_of_sign(const HealthView& view, const JointView& 
   return found;
 }
 
-// A stretch between two touches of zero.
-struct Piece {
-  std::size_t first = 0, last = 0;
-  double ea = 0.0, ev = 0.0, ee = 0.0, aa = 0.0, av = 0.0, vv = 0.0;
-  double sign = 1.0;
-};
-
-std::vector<Piece> pieces_of(const HealthView& view, const JointView& joint, const std::vector<double>& column,
-                             bool angle, std::size_t span, double top) {
-  std::vector<Piece> pieces;
+// Speed of each row: of angles, of lines between the rows in which they change, since a count lasts for rows.
+std::vector<double> steady_speed(const HealthView& view, const std::vector<double>& column, bool angle) {
+  const std::vector<double>& t = view.log->t;
+  std::vector<double> values = column, out(column.size(), 0.0);
+  const auto span =
+      static_cast<std::size_t>(std::max(angle ? 1.0 : 0.0, std::round((angle ? 0.05 : 0.03) / view.step)));
   for (const auto& [first, last] : view.segments) {
-    bool open = false;
-    for (std::size_t k = first + span; k + span < last; ++k) {
-      const Sides s = sides_of(view, column, angle, k, span);
-      const double v = 0.5 * (s.before + s.after), a = (s.after - s.before) / (static_cast<double>(span) * view.step);
-      if (v < kSlowest * top) {
-        open = false;
+    std::size_t changed = first;
+    for (std::size_t k = first + 1; angle && k < last; ++k) {
+      if (column[k] == column[k - 1] && k + 1 < last) {
         continue;
       }
-      if (!open) {
-        pieces.push_back({.first = k});
-        open = true;
+      for (std::size_t i = changed + 1; i < k; ++i) {
+        values[i] = column[changed] + (column[k] - column[changed]) * (t[i] - t[changed]) / (t[k] - t[changed]);
       }
-      Piece& p = pieces.back();
-      const double e = (*joint.effort)[k];
-      p.last = k;
-      p.ea += e * a;
-      p.ev += e * v;
-      p.ee += e * e;
-      p.aa += a * a;
-      p.av += a * v;
-      p.vv += v * v;
+      changed = k;
+    }
+    for (std::size_t k = first; k < last; ++k) {
+      const std::size_t from = k < first + span ? first : k - span, to = std::min(k + span, last - 1);
+      if (angle) {
+        out[k] = to > from ? (values[to] - values[from]) / (t[to] - t[from]) : 0.0;
+      } else {
+        for (std::size_t i = from; i <= to; ++i) {
+          out[k] += values[i] / static_cast<double>(to - from + 1);
+        }
+      }
     }
   }
-  std::erase_if(pieces, [&](const Piece& p) { return view.log->t[p.last] - view.log->t[p.first] < kShortestPiece; });
-  return pieces;
+  return out;
 }
 
-// e = s (A a + F v) with one sign s a piece: the share of e that is explained.
-double fit_signs(std::vector<Piece>& pieces, bool free) {
-  double ee = 0.0, aa = 0.0, av = 0.0, vv = 0.0, ea = 0.0;
-  for (Piece& p : pieces) {
-    ee += p.ee;
-    aa += p.aa;
-    av += p.av;
-    vv += p.vv;
-    p.sign = free && p.ea < 0.0 ? -1.0 : 1.0;
+// A stretch between two touches of zero, and one half of it, up to its fastest row or from there on: what its effort
+// adds up to, by how much its speed changes, how far it goes, over the root of how long it takes.
+struct Piece {
+  std::size_t first = 0, last = 0;
+  double sign = 1.0;
+};
+struct Half {
+  std::size_t piece = 0;
+  double effort = 0.0, change = 0.0, way = 0.0;
+};
+
+void add_half(const HealthView& view, const std::vector<double>& speed, const std::vector<double>& effort,
+              std::size_t piece, std::size_t from, std::size_t to, std::vector<Half>& halves) {
+  constexpr std::size_t kLeastRows = 3;
+  if (to < from + kLeastRows) {
+    return;
   }
-  const double det = aa * vv - av * av;
+  const std::vector<double>& t = view.log->t;
+  Half half{.piece = piece, .change = speed[to] - speed[from]};
+  for (std::size_t k = from; k < to; ++k) {
+    half.effort += effort[k] * (t[k + 1] - t[k]);
+    half.way += speed[k] * (t[k + 1] - t[k]);
+  }
+  const double root = std::sqrt(t[to] - t[from]);
+  half.effort /= root;
+  half.change /= root;
+  half.way /= root;
+  halves.push_back(half);
+}
+
+// effort = s (A change + F way) with one sign s a piece: the share of the efforts that is explained.
+double fit_signs(const std::vector<Half>& halves, std::vector<Piece>& pieces, bool free) {
+  std::vector<double> sums(pieces.size(), 0.0);
+  const auto settle_signs = [&] {
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      pieces[i].sign = free && sums[i] < 0.0 ? -1.0 : 1.0;
+    }
+    std::ranges::fill(sums, 0.0);
+  };
+  double ee = 0.0, cc = 0.0, cw = 0.0, ww = 0.0;
+  for (const Half& h : halves) {
+    sums[h.piece] += h.effort * h.change;
+    ee += h.effort * h.effort;
+    cc += h.change * h.change;
+    cw += h.change * h.way;
+    ww += h.way * h.way;
+  }
+  settle_signs();
+  const double det = cc * ww - cw * cw;
   if (!(det > 0.0) || !(ee > 0.0)) {
     return 0.0;
   }
   double explained = 0.0;
-  for (int pass = 0; pass < (free ? 10 : 1); ++pass) {
-    double ev = 0.0;
-    ea = 0.0;
-    for (const Piece& p : pieces) {
-      ea += p.sign * p.ea;
-      ev += p.sign * p.ev;
+  for (int pass = 0; pass < (free ? 20 : 1); ++pass) {
+    double ec = 0.0, ew = 0.0;
+    for (const Half& h : halves) {
+      ec += pieces[h.piece].sign * h.effort * h.change;
+      ew += pieces[h.piece].sign * h.effort * h.way;
     }
-    const double A = (ea * vv - ev * av) / det, F = (ev * aa - ea * av) / det;
-    explained = (A * ea + F * ev) / ee;
-    for (Piece& p : pieces) {
-      p.sign = free && A * p.ea + F * p.ev < 0.0 ? -1.0 : 1.0;
+    const double A = (ec * ww - ew * cw) / det, F = (ew * cc - ec * cw) / det;
+    explained = (A * ec + F * ew) / ee;
+    for (const Half& h : halves) {
+      sums[h.piece] += h.effort * (A * h.change + F * h.way);
     }
+    settle_signs();
   }
   return explained;
 }
@@ -185,30 +218,42 @@ double fit_signs(std::vector<Piece>& pieces, bool free) {
 // Rows at which a speed that is never negative bounces off zero while its effort goes on as through a reversal.
 std::vector<std::size_t> bounces(const HealthView& view, const JointView& joint, const std::vector<double>& column,
                                  bool angle) {
-  const std::size_t span = std::max(span_of(view, joint, column, angle),
-                                    static_cast<std::size_t>(std::max(1.0, std::round(0.05 / view.step))));
-  std::vector<double> speeds;
-  std::size_t back = 0;
-  for (const auto& [first, last] : view.segments) {
-    for (std::size_t k = first + span; k + span < last; ++k) {
-      const Sides s = sides_of(view, column, angle, k, span);
-      speeds.push_back(0.5 * (s.before + s.after));
-    }
-  }
-  const double top = rank_of(speeds, 0.99);
-  back = static_cast<std::size_t>(std::ranges::count_if(speeds, [&](double v) { return v < -0.05 * top; }));
-  if (!(top > 0.0) || 200 * back > speeds.size()) {
+  const std::vector<double> speed = steady_speed(view, column, angle);
+  std::vector<double> sizes(speed.size());
+  std::ranges::transform(speed, sizes.begin(), [](double v) { return std::abs(v); });
+  const double top = rank_of(std::move(sizes), 0.99);
+  const auto back = static_cast<std::size_t>(std::ranges::count_if(speed, [&](double v) { return v < -0.05 * top; }));
+  if (!(top > 0.0) || 200 * back > speed.size()) {
     return {};
   }
-  std::vector<Piece> pieces = pieces_of(view, joint, column, angle, span, top);
-  const double as_logged = fit_signs(pieces, false), with_signs = fit_signs(pieces, true);
-  if (with_signs < kExplained || 1.0 - as_logged < 2.0 * (1.0 - with_signs)) {
+  const std::vector<double>& t = view.log->t;
+  std::vector<Piece> pieces;
+  std::vector<Half> halves;
+  for (const auto& [first, last] : view.segments) {
+    for (std::size_t k = first; k < last; ++k) {
+      const std::size_t from = k;
+      while (k < last && speed[k] >= kDip * top) {
+        ++k;
+      }
+      if (k == from || t[k - 1] - t[from] < kShortestPiece) {
+        continue;
+      }
+      const auto begin = speed.begin() + static_cast<std::ptrdiff_t>(from);
+      const auto end = speed.begin() + static_cast<std::ptrdiff_t>(k);
+      const auto fastest = static_cast<std::size_t>(std::max_element(begin, end) - speed.begin());
+      add_half(view, speed, *joint.effort, pieces.size(), from, fastest, halves);
+      add_half(view, speed, *joint.effort, pieces.size(), fastest, k - 1, halves);
+      pieces.push_back({.first = from, .last = k - 1});
+    }
+  }
+  const double as_logged = fit_signs(halves, pieces, false), with_signs = fit_signs(halves, pieces, true);
+  if (with_signs < kExplained || 1.0 - as_logged < kTimesLess * (1.0 - with_signs)) {
     return {};
   }
   std::vector<std::size_t> found;
   std::size_t same = 0;
   for (std::size_t i = 1; i < pieces.size(); ++i) {
-    if (view.log->t[pieces[i].first] - view.log->t[pieces[i - 1].last] > kLongestDip) {
+    if (t[pieces[i].first] - t[pieces[i - 1].last] > kLongestDip) {
       continue;
     }
     if (pieces[i].sign != pieces[i - 1].sign) {

@@ -163,7 +163,7 @@ Passages passages_of(const HealthView& view, const std::vector<double>& speed, d
   return p;
 }
 
-enum class Cut { unknown, rounded, towards_zero, down };
+enum class Cut { unknown, rounded, not_inwards, towards_zero, down };
 
 Cut kind_of(const HealthView& view, const JointView& joint, double unit) {
   if (const auto o = against_angles(view, joint, unit)) {
@@ -175,10 +175,13 @@ Cut kind_of(const HealthView& view, const JointView& joint, double unit) {
            : is(o->inwards, o->inwards_error, 0.0) && is(o->down, o->down_error, 0.0)              ? Cut::rounded
                                                                                                    : Cut::unknown;
   }
+  // Simulated drives with and without dry friction, which holds a speed at zero: 0.9 to 1.3 and 1.9 to 2.5.
   const Passages p = passages_of(view, *joint.speed, unit);
-  return p.count < kLeastPassages || kOffsetErrors * p.error > 0.5 ? Cut::unknown
-         : std::abs(p.ratio - 2.0) < 0.3                           ? Cut::towards_zero
-                                                                   : Cut::unknown;
+  const double doubt = kOffsetErrors * p.error;
+  return p.count < kLeastPassages                   ? Cut::unknown
+         : p.ratio - doubt > 1.45 && p.ratio < 2.75 ? Cut::towards_zero
+         : p.ratio + doubt < 1.65 && p.ratio > 0.75 ? Cut::not_inwards
+                                                    : Cut::unknown;
 }
 
 }  // namespace
@@ -200,8 +203,8 @@ void check_rounding(const HealthView& view, std::vector<LogFinding>& findings) {
     }
     const Cut cut = kind_of(view, joint, unit);
     const bool cut_off = cut == Cut::towards_zero || cut == Cut::down;
-    const std::string at_most = fmt::format("`noise: {{wheel_speed: {:.4g}}}`",
-                                            cut == Cut::towards_zero || cut == Cut::unknown ? unit : 0.5 * unit);
+    const std::string at_most =
+        fmt::format("`noise: {{wheel_speed: {:.4g}}}`", cut == Cut::rounded || cut == Cut::down ? 0.5 * unit : unit);
     LogFinding f{.id = "signals.rounded",
                  .topic = FindingTopic::signals,
                  .severity = cut_off || cut == Cut::unknown ? FindingSeverity::warning : FindingSeverity::notice,
@@ -211,7 +214,10 @@ void check_rounding(const HealthView& view, std::vector<LogFinding>& findings) {
     f.sentence = fmt::format(
         "{} is in whole multiples of {}, {:.2g} % of the top speed: {}.", joint.speed_name, unit_words(unit),
         100.0 * unit / joint.top,
-        cut == Cut::rounded        ? "rounded, wrong by half of that at most"
+        cut == Cut::rounded ? "rounded, wrong by half of that at most"
+        : cut == Cut::not_inwards
+            ? "rounded, or cut off downwards: wrong by half of that at most, or too low by half of "
+              "it on average"
         : cut == Cut::towards_zero ? "cut off towards zero, and so too small by half of that on average"
         : cut == Cut::down         ? "cut off downwards, and so too low by half of that on average"
                            : "rounded, or cut off and so wrong by up to the whole of it to one side, which this "
@@ -225,10 +231,11 @@ void check_rounding(const HealthView& view, std::vector<LogFinding>& findings) {
     } else {
       f.next = fmt::format("Write {} into the robot file{}; best, log angles, or speeds with their full resolution.",
                            at_most,
-                           cut == Cut::rounded ? ""
-                                               : fmt::format(", and `speed_cut: {{unit: {:.8g}, towards: zero}}` where "
-                                                             "the driver cuts off (a cast to int does)",
-                                                             unit));
+                           cut == Cut::rounded || cut == Cut::not_inwards
+                               ? ""
+                               : fmt::format(", and `speed_cut: {{unit: {:.8g}, towards: zero}}` where "
+                                             "the driver cuts off (a cast to int does)",
+                                             unit));
     }
     findings.push_back(std::move(f));
   }

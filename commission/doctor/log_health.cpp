@@ -511,6 +511,7 @@ LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, co
         [&] {
           check_signals(view, reader, health.findings);
           check_rounding(view, health.findings);
+          check_spikes(view, health.findings);
           check_odometry(view, health.findings);
           check_gyro_delay(view, health.findings);
           check_sources(view, health.findings);
@@ -518,6 +519,10 @@ LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, co
         },
         [&] { reaches_bounds = !check_direction(view, of_motion) && check_motion(view, of_motion); });
     std::ranges::move(of_motion, std::back_inserter(health.findings));
+    const LogFinding* smoothed = health.find("signals.speed_filter");
+    if (smoothed != nullptr && smoothed->speed_filter) {  // that is why the wheels are later than a gyro
+      std::erase_if(health.findings, [](const LogFinding& f) { return f.id == "time.gyro_delay"; });
+    }
   }
   conclude(view, reaches_bounds, health);
   return health;

@@ -180,6 +180,8 @@ void check_gyro_delay(const HealthView& view, std::vector<LogFinding>& findings)
 bool check_direction(const HealthView& view, std::vector<LogFinding>& findings);
 /// Speeds in whole multiples of a unit that no encoder makes, rounded or cut off.
 void check_rounding(const HealthView& view, std::vector<LogFinding>& findings);
+/// Single rows, or two, in which a column leaps away and back.
+void check_spikes(const HealthView& view, std::vector<LogFinding>& findings);
 /// Efforts that are early because speeds passed through a low-pass filter, in this setting with its fit. Returns
 /// whether that, or that it cannot be told from a delay, was said.
 bool check_smoothing(const HealthView& view, const commission::Setting& setting, const commission::Fit& fit,

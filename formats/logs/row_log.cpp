@@ -77,19 +77,17 @@ void WheelAngle::learn_range(double step, double expected) {
   if (!again) {
     return;
   }
-  const double turns = std::round(jump / turn);
-  if (turns >= 1.0 && std::abs(jump - turns * turn) < about) {
-    turn_ = turns * turn;
-    wrapped_ = true;
-    return;
-  }
-  const double counts = turn / count_, whole = std::round(counts);
+  const double counts = turn / count_, whole = std::round(counts), turns = std::round(jump / turn);
   for (const double range : {0x1p16, 0x1p32}) {
     if (whole >= 1.0 && std::abs(counts - whole) < exact && std::abs(jump - range * count_) < about) {
       turn_ = range * turn / whole;
       wrapped_ = true;
       return;
     }
+  }
+  if (turns >= 1.0 && about < 0.1 * turn && std::abs(jump - turns * turn) < about) {
+    turn_ = turns * turn;
+    wrapped_ = true;
   }
 }
 

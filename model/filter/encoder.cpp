@@ -15,6 +15,9 @@ constexpr double kMostRounding = 0.25;     // of a count: beyond it a multiple c
 constexpr std::size_t kFewest = 50;        // non-zero speeds below which nothing is claimed
 constexpr std::size_t kFewestCounts = 8;   // different numbers of counts: a drive at two or three speeds has as few
 constexpr double kSharp = 0.01;            // with less of either, how near N and the counts must be to whole numbers
+constexpr std::size_t kFewestOfAll = 4;    // of numbers of counts that leave no great gaps: such speeds are a lattice
+constexpr double kDense = 3.0;             // of these, the largest number of counts
+constexpr double kLittleRounding = 0.05;   // of a count, of a lattice
 constexpr double kMostCounts = 4194304.0;  // 2^22
 
 double turn_over(double quantum, double step) { return 2.0 * std::numbers::pi / (quantum * step); }
@@ -103,7 +106,7 @@ std::optional<EncoderFinding> search(std::span<const double> speeds, double step
     }
     return EncoderFinding{*counts_per_turn, quantum, rounding};
   }
-  if (moving < kFewest || magnitudes.size() < 2) {
+  if (moving < kFewest || magnitudes.empty()) {
     return std::nullopt;
   }
   for (int divisor = 1; divisor <= 16; ++divisor) {
@@ -126,8 +129,15 @@ std::optional<EncoderFinding> search(std::span<const double> speeds, double step
       found = counts;
     }
     const double rounding = worst_rounding(magnitudes, quantum);
-    const bool many = magnitudes.size() >= kFewest && different_counts(magnitudes, quantum) >= kFewestCounts;
-    if (many ? rounding < kMostRounding : rounding < kSharp && std::abs(counts - std::round(counts)) < kSharp) {
+    const std::size_t different = different_counts(magnitudes, quantum);
+    const bool many = magnitudes.size() >= kFewest && different >= kFewestCounts;
+    const bool dense = different >= kFewestOfAll && most <= kDense * static_cast<double>(different);
+    const double apart = std::abs(counts - whole_counts(counts, doubt));
+    const bool in_a_row = most == static_cast<double>(different);  // one count, two, three
+    const double sharp = different == 1 ? 0.8 * kSharp : in_a_row ? std::clamp(doubt, kSharp, 10.0 * kSharp) : kSharp;
+    if (many    ? rounding < kMostRounding
+        : dense ? rounding < kLittleRounding && apart <= std::max(doubt, kSharp)
+                : rounding < kSharp && apart < sharp && (different > 1 || divisor == 1)) {
       return EncoderFinding{found, quantum, rounding};
     }
   }

@@ -178,7 +178,7 @@ TEST(Speeds, OfAnOrdinaryLogHaveNoneOfThis) {
       for (const LogTable& each : {log, without_angles(log)}) {
         const LogHealth health = examine(each, robot());
         for (const char* id : {"signals.speed_filter", "signals.no_direction", "signals.rounded",
-                               "signals.position_zero", "signals.speed_zero"}) {
+                               "signals.position_zero", "signals.speed_zero", "signals.spikes"}) {
           EXPECT_EQ(health.find(id), nullptr) << told(health);
         }
       }
@@ -254,6 +254,23 @@ TEST(Speeds, CutOffOrRoundedToAUnitAreToldByTheAngles) {
     const LogHealth alone = examine(without_angles(log), robot());
     ASSERT_NE(alone.find("signals.rounded"), nullptr) << told(alone);
     EXPECT_EQ(alone.find("signals.rounded")->speed_cut.has_value(), cut && !down) << told(alone);
+  }
+}
+
+TEST(Speeds, SingleImpossibleSamplesAreNamedWithTheirPlace) {
+  for (const char* name : {"omega_r", "phi_l", "tau_r", "gyro_z"}) {
+    for (const std::size_t rows : {1U, 2U}) {
+      LogTable log = drive({});
+      for (std::size_t i = 0; i < rows; ++i) {
+        log.column(name)[5000 + i] += 30.0;
+      }
+      const LogHealth health = examine(log, robot());
+      const LogFinding* found = health.find("signals.spikes");
+      ASSERT_NE(found, nullptr) << name << '\n' << told(health);
+      EXPECT_EQ(found->value, static_cast<double>(rows));
+      ASSERT_EQ(found->when.size(), 1U);
+      EXPECT_DOUBLE_EQ(found->when[0].lower, log.t[5000]);
+    }
   }
 }
 

@@ -48,6 +48,27 @@ TEST(FindEncoder, FindsTheResolutionOfDifferencedCounts) {
   }
 }
 
+// 20 to 32768 counts at 10 to 500 Hz, by a clock that is off against the driver's: whole counts, as they are sold.
+TEST(FindEncoder, FindsWholeCountsByAClockThatIsOff) {
+  for (const double counts : {20.0, 100.0, 360.0, 500.0, 1000.0, 2048.0, 4096.0, 8192.0, 10000.0, 16384.0, 32768.0}) {
+    for (const double rate : {10.0, 20.0, 50.0, 100.0, 200.0, 500.0}) {
+      const double rpm = 60.0 * rate / counts, quantum = 2.0 * std::numbers::pi * rate / counts;
+      const auto plain = [](double x) {  // 1, 2 or 5 · 10ᵏ: not told from a rounded speed
+        const double scaled = x / std::pow(10.0, std::floor(std::log10(x) + 1e-9));
+        return std::abs(scaled - 1.0) < 1e-3 || std::abs(scaled - 2.0) < 1e-3 || std::abs(scaled - 5.0) < 1e-3;
+      };
+      if (plain(rpm) || plain(quantum)) {
+        continue;
+      }
+      for (const double off : {0.0, 5e-5, -5e-5}) {
+        const auto found = find_encoder(differenced(counts, 1.0 / rate, 8.0, 6), (1.0 + off) / rate);
+        ASSERT_TRUE(found) << counts << " counts at " << rate << " Hz, " << off;
+        EXPECT_EQ(found->counts_per_turn, counts) << rate << " Hz, " << off;
+      }
+    }
+  }
+}
+
 TEST(FindEncoder, SurvivesFourPrintedDecimals) {
   const auto found = find_encoder(differenced(16384.0, 0.01, 8.0, 4), 0.01);
   ASSERT_TRUE(found);
