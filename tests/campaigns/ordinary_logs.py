@@ -88,8 +88,8 @@ def ask(program, *words):
 def doubts(model):
     """What a model.json says against itself, in words."""
     said = [f"{c['sentence']} {c['next']}" for c in model.get("contradictions", [])]
-    said += [f"{a['id']}: {a['detail']}" for a in model.get("assumptions", []) if a["verdict"] == "fails"]
-    return "\n".join([model.get("message", ""), *said, *model.get("notes", [])])
+    said += [a["detail"] for a in model.get("assumptions", []) if a["verdict"] == "fails"]
+    return "\n".join([model.get("message", ""), *said])
 
 
 def outside(model, truth):
@@ -170,6 +170,7 @@ def examine(options, of, seed, log):
         commission = ask(options.program, "commission", *words, "--threads", 1)
         says = "\n".join(f"{f['id']}: {f['sentence']} {f['next']}" for f in doctor.json.get("findings", [])
                          if f["severity"] in ("warning", "fatal"))
+        commission.text = commission.text.replace(str(folder), "DIR")  # which names the kind
         verdict, why = judge(of, log.truth, commission, says)
         if doctor.code not in (0, 1, 2):
             verdict, why = "wrong", f"doctor ends with {doctor.code}"
@@ -181,7 +182,7 @@ def examine(options, of, seed, log):
         if options.keep:
             (folder / "answers.json").write_text(json.dumps(
                 {"truth": log.truth, "verdict": verdict, "why": why, "doctor": doctor.json,
-                 "commission": commission.json, "refusal": commission.text}, indent=1))
+                 "code": commission.code, "commission": commission.json, "refusal": commission.text}, indent=1))
         return {"kind": of.name, "seed": seed, "verdict": verdict, "why": why,
                 "warrant": commission.json.get("warrant"), "width": width, "accounts": differ, "doctor": says,
                 "rate": log.robot.rate, "hold": log.robot.hold,
