@@ -166,7 +166,7 @@ LATE = r"\blate\b|\blag|\bdelay|\bshift|latency"
 CLOCK = r"stamps? (?:that )?(?:scatter|are not|of)|scatter|jitter|even(?:ly)? (?:sampl|spaced)|burst"
 
 
-@kind(rates=(100,), sensors={"motion": "angles", "counts": 2048})
+@kind(rates=(100,), hold="at_samples", sensors={"motion": "angles", "counts": 2048})
 def ordinary(log):
     """What any robot logs: 1 % lost, 200 µs of jitter, efforts through 5 ms, 2,048 counts, casters in the bag."""
     for name in log.of("tau"):
@@ -205,7 +205,7 @@ def uneven(log):
         log.sense(name, log.true[name][log.rows])
 
 
-@kind(CLOCK + "|coarse|whole|resolution|duplicate|same time")
+@kind(CLOCK + "|coarse stamps|duplicate|same time|arrive", false="deg/s|unit of the efforts")
 def bursts(log):
     """Stamps of two to five messages that arrive together: 2 % of a step apart."""
     many = int(log.g.integers(2, 6))
@@ -231,7 +231,7 @@ def late_pose(log):
     log.late(["x", "y", "theta"], log.g.uniform(0.03, 0.15))
 
 
-SMOOTHED = r"smooth|filter(?:ed|s the)|low.?pass|averag|window"
+SMOOTHED = r"smooth|low.?pass|(?:speeds?|efforts?|driver)\b[^.;]*\b(?:filter|averag|mean of)"
 
 
 @kind(SMOOTHED, {"motion": "speeds"}, false=r"delay: ")
@@ -281,8 +281,8 @@ def rpm(log):
         log.columns[name] = cut(log.true[name][log.rows] / unit) * unit
 
 
-DIRECTION = (r"direction|revers|sign of (?:the|its|their) (?:command|own)|no sign|without sign|unsigned|"
-             r"never (?:negative|falls|turns back)")
+DIRECTION = (r"no_direction|does not see the direction|without (?:a )?direction|no direction|"
+             r"direction of (?:its|their) own|sign of (?:the|its|their) command|never (?:falls|turns back)")
 
 
 @kind(DIRECTION, {"motion": "both"}, possible=False, false=LATE, drive="speed")
@@ -314,11 +314,11 @@ def spikes(log):
         log.columns[name][at] = top * log.g.uniform(5, 50, len(at)) * log.g.choice([-1, 1], len(at))
 
 
-STILL = (r"frozen|stand(?:s|ing)? still|stood still|not change|constant|one value|always (?:0|zero|the same)|stuck|"
-         r"repeat|same value")
+STILL = (r"frozen|stand(?:s|ing)? still|stood still|(?:does|do|did) not change|signals\.constant|one value|stuck|"
+         r"always (?:0|zero|the same)|same value")
 
 
-@kind(STILL + "|zero", {"motion": "both"})
+@kind(STILL + "|(?:position|speed)_zero", {"motion": "both"})
 def dead_motion(log):
     """Angles that are always 0 beside good speeds, or the other way round."""
     for name in log.of(str(log.g.choice(["phi", "omega"]))):
@@ -338,7 +338,7 @@ def wrapped(log):
         log.columns[name] = np.mod(phi + start - low, span) + low
 
 
-@kind(STILL + r"|clamp|zero|saturat|limit")
+@kind(STILL + r"|clamp|saturat|reads? zero|is zero")
 def frozen_effort(log):
     """For 1 to 20 s efforts of one or both wheels keep a value, are zero, or are clamped."""
     at, how = log.stretch(log.g.uniform(1, 20)), str(log.g.choice(["frozen", "zero", "clamped"]))
@@ -368,7 +368,7 @@ def effort_unit(log):
         log.columns[name] *= factor
 
 
-@kind(r"cop(?:y|ies)|same (?:values?|column|effort|numbers)|identical|equal|repeats", possible=False)
+@kind(r"cop(?:y|ies|ied)\b|same (?:values?|column|effort|numbers)|identical", possible=False)
 def copied_effort(log):
     """The effort of one wheel in both columns."""
     one, other = log.g.permutation(log.of("tau"))
@@ -457,13 +457,13 @@ def mecanum(log):
     log.truth, log.own = None, joints
 
 
-@kind(r"heading|driving direction|turned|frame", {"pose": True})
+@kind(r"heading_offset|driving direction|turned (?:by|against)|pose_frame", {"pose": True})
 def turned_pose(log):
     """A heading that is up to 180 degrees away from the driving direction."""
     log.columns["theta"] = log.columns["theta"] + log.g.uniform(-np.pi, np.pi)
 
 
-@kind(r"mirror|counts? backwards|turned round|other way|sign", {"gyro": False, "pose": False}, possible=False,
+@kind(r"mirror|counts? backwards|turned round|other way round", {"gyro": False, "pose": False}, possible=False,
       doubt=True)
 def mirrored_wheel(log):
     """A wheel that counts and pushes the other way, without gyro and pose."""
@@ -490,7 +490,7 @@ def speed_unit(log):
         log.columns[name] *= factor
 
 
-@kind(r"halves|thirds|mass.*chang|constant|not the same", {"declared": True}, possible=False, doubt=True,
+@kind(r"halves|thirds|parts? of (?:the|a|this) log|mass[^.]*chang|constant_parameters", {"declared": True}, possible=False, doubt=True,
       heavier=(1.05, 1.3))
 def heavier(log):
     """From the middle on the robot has 5 to 30 % more mass."""
@@ -535,7 +535,7 @@ def dialect(log):
         log.dialect.time = "us"
 
 
-@kind(r"days|unit|median step", {"bag": False}, possible=False)
+@kind(r"\bdays|units\.time", {"bag": False}, possible=False)
 def days(log):
     """Times in days, as a spreadsheet has them."""
     log.columns["t"] = 46110.0 + log.columns["t"] / 86400

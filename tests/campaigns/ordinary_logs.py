@@ -19,7 +19,7 @@ Each log is given to `doctor` and `commission`, and the truth is known. By kind 
     accounts      logs of which doctor and commission (with --same-account identify, gap, try and Python, too) disagree
 
 and lists every wrong one with the command that makes it again (--keep DIR keeps log, robot file and answers). Ends with
-1 where there is a wrong one, with 77 without numpy. Everything random follows from kind and seed.
+1 where there is a wrong one, with 77 without numpy. Everything random follows from kind, seed and --seconds.
 """
 
 import argparse
@@ -48,10 +48,10 @@ ROOT = Path(__file__).resolve().parents[2]
 BATCH = 40  # robots simulated at once
 LONGEST = 600.0  # s that a command may take
 
-def make_logs(of, seeds):
-    """The logs of a kind, one a seed; each follows from kind and seed alone."""
+def make_logs(of, seeds, seconds=(60, 100)):
+    """The logs of a kind, one a seed; each follows from kind, seed and the range of its length alone."""
     generators = [np.random.default_rng([seed, zlib.crc32(of.name.encode())]) for seed in seeds]
-    robots = [world.draw_robot(g, **{"rates": RATES, "seconds": (60, 100), **of.robot}) for g in generators]
+    robots = [world.draw_robot(g, **{"rates": RATES, "seconds": seconds, **of.robot}) for g in generators]
     for robot, true, g in zip(robots, world.simulate(robots), generators):
         log = Log(robot, true, g, **of.sensors)
         of.make(log)
@@ -88,8 +88,8 @@ def ask(program, *words):
 def doubts(model):
     """What a model.json says against itself, in words."""
     said = [f"{c['sentence']} {c['next']}" for c in model.get("contradictions", [])]
-    said += [f"{a['id']}: {a['detail']}" for a in model.get("assumptions", []) if a["verdict"] == "fails"]
-    return "\n".join([model.get("message", ""), *said, *model.get("notes", [])])
+    said += [a["detail"] for a in model.get("assumptions", []) if a["verdict"] == "fails"]
+    return "\n".join([model.get("message", ""), *said])
 
 
 def outside(model, truth):
@@ -170,6 +170,7 @@ def examine(options, of, seed, log):
         commission = ask(options.program, "commission", *words, "--threads", 1)
         says = "\n".join(f"{f['id']}: {f['sentence']} {f['next']}" for f in doctor.json.get("findings", [])
                          if f["severity"] in ("warning", "fatal"))
+        commission.text = commission.text.replace(str(folder), "DIR")  # which names the kind
         verdict, why = judge(of, log.truth, commission, says)
         if doctor.code not in (0, 1, 2):
             verdict, why = "wrong", f"doctor ends with {doctor.code}"
@@ -181,7 +182,7 @@ def examine(options, of, seed, log):
         if options.keep:
             (folder / "answers.json").write_text(json.dumps(
                 {"truth": log.truth, "verdict": verdict, "why": why, "doctor": doctor.json,
-                 "commission": commission.json, "refusal": commission.text}, indent=1))
+                 "code": commission.code, "commission": commission.json, "refusal": commission.text}, indent=1))
         return {"kind": of.name, "seed": seed, "verdict": verdict, "why": why,
                 "warrant": commission.json.get("warrant"), "width": width, "accounts": differ, "doctor": says,
                 "rate": log.robot.rate, "hold": log.robot.hold,
@@ -225,7 +226,7 @@ def run(options):
             for first in range(0, len(seeds), BATCH):
                 some = seeds[first:first + BATCH]
                 records += pool.map(lambda pair: examine(options, KINDS[name], *pair),
-                                    zip(some, make_logs(KINDS[name], some)))
+                                    zip(some, make_logs(KINDS[name], some, options.seconds)))
             of_kind = [r for r in records if r["kind"] == name]
             print(row(name, of_kind, KINDS[name].possible), file=sys.stderr, flush=True)
     return records
@@ -292,6 +293,7 @@ def main():
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS), metavar="KIND")
     parser.add_argument("--logs", type=int, default=200, help="of each kind")
     parser.add_argument("--seed", type=int, default=1, help="of the first log")
+    parser.add_argument("--seconds", type=float, nargs=2, default=(60, 100), help="range of their lengths")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--out", type=Path, help="JSON of all records")
     parser.add_argument("--keep", type=Path, help="directory for logs, robot files and answers")

@@ -31,13 +31,14 @@ class Robot:
     track: float
     rate: float  # Hz of the log
     seconds: float
-    hold: str  # at_samples: torques change at stamps; between: half a step from them; linear: all the time
+    hold: str  # at_samples: torques change at stamps; between: `phase` of a step before them; linear: all the time
     speed: np.ndarray = None
     torque: np.ndarray = None
     kp: float = 0.0
     ki: float = 0.0
     heavier: float = 1.0  # factor on the mass from the middle of the log on
     worn: float = 1.0  # factor on the radius of the left wheel
+    phase: float = 0.0
     top: float = 0.0  # m/s that is meant to be reached
     fine: int = 0  # integration steps a sample
 
@@ -74,13 +75,14 @@ def draw_robot(g, rates, seconds, drive="", hold="", dry=None, memory=(1.0, 8.0)
     viscous, viscous_yaw = mass / log_uniform(g, *memory), inertia / log_uniform(g, *np.multiply(memory, 0.7))
     rate = float(g.choice(rates))
     drive = drive or str(g.choice(["speed", "speed", "joystick", "steps"]))
-    hold = hold or (str(g.choice(["at_samples", "between", "linear"])) if drive == "speed" and rate >= 50 else
-                    str(g.choice(["at_samples", "between"])))
+    hold = hold or str(g.choice(["at_samples", "at_samples", "between"] +
+                                ["linear"] * (drive == "speed" and rate >= 50)))
     top, turn = g.uniform(0.4, 1.2), g.uniform(0.6, 2.0)
     force = viscous * top + mass * top * 1.5  # N, typical
     share = g.uniform(*dry) if dry else g.uniform(0.03, 0.2) * (g.uniform() < 0.5 and hold != "linear")
     out = Robot(mass, inertia, viscous, viscous_yaw, share * force * radius / 2, radius, track, rate,
-                float(g.uniform(*seconds)), hold, heavier=g.uniform(*heavier), worn=g.uniform(*worn), top=top)
+                float(g.uniform(*seconds)), hold, heavier=g.uniform(*heavier), worn=g.uniform(*worn), phase=g.uniform(0.15, 0.85),
+                top=top)
     t = np.arange(0, out.seconds + 2 * TABLE, TABLE)
     if drive == "steps":
         both = knots(g, t, viscous * top * radius / 2, 2.5, 0.2, 1e-6)
@@ -116,7 +118,7 @@ def simulate(robots):
                 table[:len(values), i] = values
     each = np.arange(many)
     period = np.where([r.hold == "linear" for r in robots], 1, of["fine"])
-    phase = np.where([r.hold == "between" for r in robots], of["fine"] // 2, 0)
+    phase = np.where([r.hold == "between" for r in robots], np.round(of["fine"] * [r.phase for r in robots]), 0)
 
     def coefficients(mass):
         """Decay of both speeds over a step, and their change by a unit of force or moment."""
