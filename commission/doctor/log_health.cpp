@@ -101,7 +101,7 @@ void check_rate(const HealthView& view, const ReaderCounts& reader, double secon
   const std::vector<std::string> units =
       time_units(view.step, view.log->t.empty() ? 0.0 : view.log->t.front(),
                  model::on_two_wheels(view.robot) ? kShortestStep : kShortestAxisStep);
-  if (!units.empty()) {
+  if (!units.empty() && std::ranges::find(out, std::string("time.bursts"), &LogFinding::id) == out.end()) {
     out.push_back(about_time("units.time", FindingSeverity::fatal,
                              fmt::format("The median step is {:.4g} s: the time stamps look like {}, not s.", view.step,
                                          core::listed(units, " or ")),
