@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Assumptions that statistics of a log contradict, one broken at a time, on logs of a robot that shares no code with the
-// toolkit's own simulator: the word guaranteed goes where one is broken, and stays where none is.
+// Assumptions that statistics of a log contradict, one broken at a time, on logs of a robot that shares no code with
+// the toolkit's own simulator: the word guaranteed goes where one is broken, and stays where none is.
 #include <algorithm>
 #include <array>
 #include <cmath>
