@@ -17,7 +17,6 @@
 #include "commission/contradiction.hpp"
 #include "commission/kinematic.hpp"
 #include "commission/output_noise.hpp"
-#include "commission/premises.hpp"
 #include "commission/survey.hpp"
 #include "commission/validation.hpp"
 #include "core/log.hpp"

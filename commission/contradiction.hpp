@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Contradiction: one finding that contradicts what a commissioned model takes for granted.
+/// Contradiction: one finding that contradicts what a commissioned model takes for granted; verdicts on its premises.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include "core/warrant.hpp"
 
 namespace wheelwright::commission {
 
@@ -40,5 +43,22 @@ struct LogContradiction {
 
 /// Name for files: "effort_constant" and so on.
 [[nodiscard]] std::string_view to_string(LogContradiction::Kind kind);
+
+/// Verdict on one premise.
+struct PremiseVerdict {
+  /// `holds` only where violations that matter would have shown: see test_premises() (premises.hpp).
+  core::AssumptionVerdict verdict = core::AssumptionVerdict::not_tested;
+  std::string detail{};  ///< what was found, and the smallest violation that would have shown, in numbers
+};
+
+/// What the rows of a log say of the premises.
+struct Premises {
+  PremiseVerdict constant;  ///< mass, inertia and friction are the same throughout the log
+  PremiseVerdict offset;    ///< no effort has an offset beyond what is declared
+  PremiseVerdict friction;  ///< friction has the shape that the model gives it
+  /// Of two wheels, where the log has neither gyro nor pose: turning over driving, root mean squares of ω_R − ω_L and
+  /// ω_R + ω_L. Above 1 one of the wheels may count backwards.
+  std::optional<double> turning;
+};
 
 }  // namespace wheelwright::commission

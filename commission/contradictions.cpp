@@ -12,6 +12,7 @@
 #include "commission/evidence.hpp"
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
+#include "commission/premises.hpp"
 #include "commission/setting.hpp"
 #include "commission/setting_rows.hpp"
 #include "commission/speed_smoothing.hpp"

@@ -11,7 +11,6 @@
 
 #include "bounds/box.hpp"
 #include "commission/contradiction.hpp"
-#include "commission/premises.hpp"
 #include "core/interval.hpp"
 #include "core/log.hpp"
 #include "model/filter/noise.hpp"

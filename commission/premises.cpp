@@ -6,7 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <span>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>

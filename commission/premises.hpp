@@ -4,35 +4,15 @@
 /// an offset, friction of the shape that the model has (docs/methods/assumptions.md).
 #pragma once
 
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "commission/contradiction.hpp"
 #include "core/log.hpp"
-#include "core/warrant.hpp"
 
 namespace wheelwright::commission {
 
 struct Fit;
 struct Setting;
-
-/// Verdict on one premise.
-struct PremiseVerdict {
-  /// `holds` only where violations that matter would have shown: see test_premises().
-  core::AssumptionVerdict verdict = core::AssumptionVerdict::not_tested;
-  std::string detail{};  ///< what was found, and the smallest violation that would have shown, in numbers
-};
-
-/// What the rows of a log say of the premises.
-struct Premises {
-  PremiseVerdict constant;  ///< mass, inertia and friction are the same throughout the log
-  PremiseVerdict offset;    ///< no effort has an offset beyond what is declared
-  PremiseVerdict friction;  ///< friction has the shape that the model gives it
-  /// Of two wheels, where the log has neither gyro nor pose: turning over driving, root mean squares of ω_R − ω_L and
-  /// ω_R + ω_L. Above 1 one of the wheels may count backwards.
-  std::optional<double> turning;
-};
 
 /// Probability that a log which keeps to all premises is said to break one.
 inline constexpr double kPremiseRisk = 1e-3;

