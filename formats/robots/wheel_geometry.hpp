@@ -105,8 +105,8 @@ struct LumpedBody {
 /// in no such file.
 ///
 /// A link without an inertial has no mass where it has no shape either (a frame), or is one of `massless`, which "all"
-/// makes all of them. Throws InputError for others, naming file, line and all of these links; for a name in `massless` that is no link or has a mass; where
-/// nothing has a mass.
+/// makes all of them. Throws InputError for others, naming file, line and all of these links; for a name in `massless`
+/// that is no link or has a mass; where nothing has a mass.
 [[nodiscard]] LumpedBody lumped_body(const RobotTree& tree, const WheelJoints& wheels, const Axle& axle,
                                      const std::vector<std::string>& massless);
 
