@@ -148,7 +148,10 @@ void describe_file(const FileWalk& lines, const CsvHeader& header, const std::ve
     file.notes.push_back(fmt::format("times are counts of {}, and were read as such", rows.clock_unit()));
   }
   for (const auto& [name, factor] : header.factors) {
-    file.notes.push_back(fmt::format("{} is {} times {:g}", name, header.fields[header.found.at(name)], factor));
+    const std::size_t field = header.found.at(name);
+    const bool below = field < header.units.size() && !header.units[field].empty();
+    file.notes.push_back(fmt::format("{} is {}{} times {:g}", name, header.fields[field],
+                                     below ? fmt::format(" [{}]", header.units[field]) : "", factor));
   }
   const files::ByteSource& source = lines.lines.source();
   file.format = "csv";

@@ -22,6 +22,7 @@
 #include "formats/files/bytes.hpp"
 #include "formats/files/words.hpp"
 #include "formats/logs/csv.hpp"
+#include "formats/logs/csv_write.hpp"
 #include "formats/logs/joint_states.hpp"
 #include "formats/logs/known_logger.hpp"
 #include "formats/logs/log_file.hpp"
@@ -607,6 +608,13 @@ std::size_t CsvRowReader::read_fields(std::string_view line, Defect& defect) {
   }
 }
 
+namespace {
+
+constexpr double a_day = 86400.0;
+constexpr double day_of_1970 = 25569.0;  // of a spreadsheet, from 30 December 1899, of a zone that it does not tell
+
+}  // namespace
+
 /// Settles how times are written by the first of them: values_[0], and `count` where it is a whole number.
 void CsvRowReader::begin_clock(std::optional<std::int64_t> count) {
   constexpr double a_year = 3.2e7;  // s: later than 1971, whichever unit
@@ -633,10 +641,14 @@ void CsvRowReader::begin_clock(std::optional<std::int64_t> count) {
     if (since_1970 || !clock_.unit.empty()) {
       clock_.origin = common_origin(shared_origin_, second);
     }
-  } else if (is_since_1970(t * time_factor_) && !keep_seconds_) {
-    clock_.kind = Clock::Kind::epoch;
-    clock_.zone = "UTC";
-    clock_.origin = common_origin(shared_origin_, static_cast<std::int64_t>(std::floor(t * time_factor_)));
+  } else if (!keep_seconds_) {
+    const bool serial = time_factor_ == a_day;
+    const double seconds = (t - (serial ? day_of_1970 : 0.0)) * time_factor_;
+    if ((serial || time_factor_ <= 1.0) && is_since_1970(seconds)) {
+      clock_.kind = Clock::Kind::epoch;
+      clock_.zone = serial ? "" : "UTC";
+      clock_.origin = common_origin(shared_origin_, static_cast<std::int64_t>(std::floor(seconds)));
+    }
   }
 }
 
@@ -669,7 +681,7 @@ void CsvRowReader::convert_time(std::string_view text) {
                                                       std::string_view(end, static_cast<std::size_t>(last - end)))
                                         : std::string();
       if (!fraction || files::parse_number(less.data(), less.data() + less.size(), t) == nullptr) {
-        t = t * time_factor_ - origin;
+        t = (t - (time_factor_ == a_day ? day_of_1970 : 0.0)) * time_factor_ - origin;
       }
       break;
     }
@@ -932,10 +944,23 @@ void append_number(std::string& text, double value) {
   text.append(digits.data(), end);
 }
 
+/// Appends `t` s after `origin`: whole seconds are added to whole seconds, and no digit is lost.
+void append_time(std::string& text, double t, std::int64_t origin) {
+  if (origin == 0 || !(t >= 0.0 && t < 1e15)) {
+    append_number(text, t + static_cast<double>(origin));
+    return;
+  }
+  std::array<char, 400> digits;
+  char* const end = std::to_chars(digits.data(), digits.data() + digits.size(), t, std::chars_format::fixed).ptr;
+  char* const point = std::find(digits.data(), end, '.');
+  text += std::to_string(origin + static_cast<std::int64_t>(std::floor(t)));
+  text.append(point, end);
+}
+
 class CsvWriter final : public LogWriter {
  public:
-  CsvWriter(const std::filesystem::path& path, const std::vector<std::string>& names)
-      : file_(path), packer_(packer_for(path, file_)), columns_(names.size()), text_("t") {
+  CsvWriter(const std::filesystem::path& path, const std::vector<std::string>& names, std::int64_t origin)
+      : file_(path), packer_(packer_for(path, file_)), columns_(names.size()), origin_(origin), text_("t") {
     for (const std::string& name : names) {
       text_ += "," + name;
     }
@@ -945,7 +970,7 @@ class CsvWriter final : public LogWriter {
   void write(const LogBlock& block) override {
     check_block(block, columns_);
     for (std::size_t k = 0; k < block.rows(); ++k) {
-      append_number(text_, block.t[k]);
+      append_time(text_, block.t[k], origin_);
       for (const auto& column : block.columns) {
         text_ += ',';
         append_number(text_, column[k]);
@@ -967,14 +992,20 @@ class CsvWriter final : public LogWriter {
   files::AtomicFile file_;
   std::unique_ptr<Packer> packer_;
   std::size_t columns_;
+  std::int64_t origin_;  ///< s that is added to every time
   std::string text_;
 };
 
 }  // namespace
 
 std::unique_ptr<LogWriter> create_csv(const std::filesystem::path& path, const std::vector<std::string>& names) {
+  return create_csv_since(path, names, 0);
+}
+
+std::unique_ptr<LogWriter> create_csv_since(const std::filesystem::path& path, const std::vector<std::string>& names,
+                                            std::int64_t origin) {
   check_column_names(names);
-  return std::make_unique<CsvWriter>(path, names);
+  return std::make_unique<CsvWriter>(path, names, origin);
 }
 
 void write_csv(const std::filesystem::path& path, const LogTable& table) {

@@ -40,6 +40,11 @@ std::string known_logger(const std::vector<std::string>& fields) {
             ? ""
             : fmt::format(", current_r: {}, current_l: {}", right_current, left_current));
   }
+  if (!ending("%time").empty() && !ending("field.velocity0").empty()) {
+    return "; this is what `rostopic echo -p` writes of a JointState: where field.name1 holds the right wheel it is "
+           "read "
+           "with --map omega_r=field.velocity1 --map tau_r=field.effort1, and the left one likewise";
+  }
   return {};
 }
 

@@ -19,6 +19,7 @@
 #include "formats/logs/bag.hpp"
 #include "formats/logs/bag_log.hpp"
 #include "formats/logs/csv.hpp"
+#include "formats/logs/csv_write.hpp"
 #include "formats/logs/hdf5_log.hpp"
 #include "formats/logs/joint_states.hpp"
 
@@ -169,7 +170,7 @@ std::unique_ptr<LogWriter> create_log(const std::filesystem::path& path, const s
   const std::string ending = name.extension().string();
   const bool packed = name != path;
   if (ending == ".csv" || (packed && ending.empty())) {
-    return create_csv(path, names);
+    return create_csv_since(path, names, static_cast<std::int64_t>(options.time_origin));
   }
   if (!packed && (ending == ".h5" || ending == ".hdf5")) {
     return create_hdf5(path, names);

@@ -74,6 +74,36 @@ TEST_F(Convert, ReadsColumnsByTheRobotFileAndItsOwnNamesWithTheSameFile) {
   EXPECT_EQ(run("doctor one.csv --robot mapped.yaml").err, "");
 }
 
+TEST_F(Convert, SecondsSince1970StayWhatTheyWereDigitForDigit) {
+  std::vector<std::string> lines = healthy_lines();
+  lines.resize(400);
+  for (std::size_t k = 1; k < lines.size(); ++k) {
+    lines[k] = fmt::format("{}.{:02}{}", 1'795'941'600 + k / 100, k % 100, lines[k].substr(lines[k].find(',')));
+  }
+  put_lines("drive.csv", lines);
+  ASSERT_EQ(run("convert drive.csv recording").code, 0);
+  for (const char* from : {"drive.csv", "recording"}) {
+    ASSERT_EQ(run(fmt::format("convert {} back.csv --force", from)).code, 0);
+    const std::vector<std::string> back = testing::lines_of(bytes(path("back.csv")));
+    ASSERT_EQ(back.size(), lines.size());
+    EXPECT_THAT(back[1], ::testing::StartsWith("1795941600.01,")) << from;
+    EXPECT_THAT(back[399], ::testing::StartsWith("1795941603.99,")) << from;
+  }
+}
+
+TEST_F(Convert, ARos1BagIsNamedByEveryCommand) {
+  put("drive.bag", std::string("#ROSBAG V2.0\nE\0\0\0\x0c", 18) + std::string(4000, '\0'));
+  for (const char* command :
+       {"convert drive.bag out.csv", "doctor drive.bag", "commission drive.bag --robot robot.yaml",
+        "identify drive.bag --robot robot.yaml", "try drive.bag --wheel-radius 0.1 --track-width 0.4 --out tried"}) {
+    const Outcome told = run(command);
+    EXPECT_EQ(told.code, 2) << command;
+    EXPECT_THAT(told.err,
+                AllOf(HasSubstr("is a ROS 1 bag"), HasSubstr("rosbags-convert --src drive.bag --dst drive_ros2")))
+        << command;
+  }
+}
+
 TEST_F(Convert, ReplacesNothingUnasked) {
   put("drive.csv", "mine");
   const Outcome refused = run("convert " + shipped() + " drive.csv");

@@ -183,7 +183,7 @@ TEST(Assumptions, AnAccelerationReadFromSamplesAllowsForTheirNoise) {
       c.model.measurement = measurement;
       c.model.robot.noise.wheel_speed.value = 1e-3;
       c.model.robot.limits["acceleration"] = 40.0;
-      EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::holds) << rate << " " << noise;
+      EXPECT_NE(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::fails) << rate << " " << noise;
       c.model.robot.limits["acceleration"] = 15.0;
       if (noise * rate < 2.0) {  // else noise hides what is beyond
         EXPECT_EQ(of(assumptions_of(c), "motion_between_samples").verdict, Verdict::fails) << rate << " " << noise;

@@ -464,6 +464,7 @@ TEST(OdometryFilter, FindsWhatALogHas) {
 TEST(OdometryFilter, SaysWhatIsWrong) {
   EXPECT_THROW(OdometryFilter(all_outputs(), 0.0), InvalidArgument);
   EXPECT_THROW(OdometryFilter(all_outputs(), 0.015), InvalidArgument);
+  EXPECT_THROW(OdometryFilter(all_outputs(), 1e6), InvalidArgument) << "times in days would fill the memory";
   EXPECT_THROW(OdometryFilter(all_outputs(), 1.0, {.heading = -1.0}), InvalidArgument);
   OdometryMeasurement none = all_outputs();
   none.position = none.heading = none.gyro = false;
