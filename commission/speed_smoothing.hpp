@@ -31,9 +31,10 @@ struct SpeedSmoothing {
 };
 
 /// The filter that explains best why the efforts of the first `most_rows` rows of `log` are early, with dry friction as
-/// a further unknown; nothing where none is found (a constant shift explains it, rows too few, efforts unsigned or corrected, motion from angles).
-/// Every candidate is y = (1 + c₁D + c₂D² + c₃D³) Yθ with the coefficients of its inverse transfer function; both sides
-/// pass through one further low-pass filter of third order, so that D is no difference and residuals compare.
+/// a further unknown; nothing where none is found (a constant shift explains it, rows too few, efforts unsigned or
+/// corrected, motion from angles). Every candidate is y = (1 + c₁D + c₂D² + c₃D³) Yθ with the coefficients of its
+/// inverse transfer function; both sides pass through one further low-pass filter of third order, so that D is no
+/// difference and residuals compare.
 [[nodiscard]] std::optional<SpeedSmoothing> speed_smoothing(LogSource& log, const Setting& setting, const Fit& fit,
                                                             std::size_t most_rows = 30000);
 

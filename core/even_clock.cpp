@@ -59,7 +59,8 @@ void EvenTimes::take(double stamp, bool starts) {
 
 void EvenTimes::settle() {
   const std::size_t n = kept_.size();
-  // Places next to the stamps, but each before that of the row after it; those that a stamp and its neighbours agree on.
+  // Places next to the stamps, but each before that of the row after it; those that a stamp and its neighbours agree
+  // on.
   std::vector<double> places(n);
   std::vector<bool> agreed(n);
   for (std::size_t k = n; k-- > 0;) {

@@ -594,7 +594,7 @@ std::optional<double> check_heading(const HealthView& view, std::vector<LogFindi
                   "against the wheels.",
                   std::abs(found->offset) / kDegree, 2.0 * found->error / kDegree,
                   found->offset > 0.0 ? "left" : "right"),
-      fmt::format("It is taken off on reading; `heading_offset: {:.4f}` in the robot file settles it.", found->offset),
+      fmt::format("Commands turn theta by it; `heading_offset: {:.4f}` in the robot file settles it.", found->offset),
       {"theta"}, found->offset);
   f.unit = "rad";
   const double margin = kTurnedErrors * found->error;

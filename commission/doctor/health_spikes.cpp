@@ -13,11 +13,11 @@
 namespace wheelwright::doctor {
 namespace {
 
-constexpr double kTimesUsual = 10.0;      // the 99 % quantile of changes from row to row
-constexpr double kSpeedShare = 0.5;       // of the size of speeds and rates (99.9 % quantile), there and back
-constexpr double kEffortShare = 3.0;      // of that of efforts, which a controller may well jerk
-constexpr double kBackAgain = 0.5;        // of the jump, by which the row after may differ from the row before
-constexpr std::size_t kLongestSpike = 2;  // rows
+constexpr double kTimesTheirUsual = 10.0;  // the 99 % quantile of changes from row to row
+constexpr double kSpeedShare = 0.5;        // of the size of speeds and rates (99.9 % quantile), there and back
+constexpr double kEffortShare = 3.0;       // of that of efforts, which a controller may well jerk
+constexpr double kBackAgain = 0.5;         // of the jump, by which the row after may differ from the row before
+constexpr std::size_t kLongestSpike = 2;   // rows
 
 double sorted_at(std::vector<double> values, double q) {
   if (values.empty()) {
@@ -39,7 +39,7 @@ std::vector<bool> spikes_of(const HealthView& view, const std::vector<double>& c
     }
   }
   const double least =
-      std::max(kTimesUsual * sorted_at(std::move(changes), 0.99), share * sorted_at(std::move(sizes), 0.999));
+      std::max(kTimesTheirUsual * sorted_at(std::move(changes), 0.99), share * sorted_at(std::move(sizes), 0.999));
   std::vector<bool> flagged(column.size(), false);
   if (!(least > 0.0)) {
     return flagged;

@@ -122,10 +122,10 @@ struct BagTopicView {
 /// - types of other packages than ROS's own give the columns that fields of theirs are named after;
 /// - a topic whose first messages cannot be read is left out and reported.
 /// Where two topics could give a column it is left out and reported. The rows' times are those of the topic with the
-/// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields; for efforts
-/// whose array is not as long as the names, joints that are named twice, and publishers that cannot be told apart, unless
-/// the map says which elements are meant. An entry NAME=velocity[JOINT] or NAME=effort[JOINT,JOINT] names no topic: it is
-/// that of the JointState that has these joints, and is passed over, and said, where none has them.
+/// efforts. Throws InputError for entries of the map that name no topic, and as RosExtractor for their fields; for
+/// efforts whose array is not as long as the names, joints that are named twice, and publishers that cannot be told
+/// apart, unless the map says which elements are meant. An entry NAME=velocity[JOINT] or NAME=effort[JOINT,JOINT] names
+/// no topic: it is that of the JointState that has these joints, and is passed over, and said, where none has them.
 [[nodiscard]] BagChoice choose_bag_columns(const std::vector<BagTopicView>& topics, const CsvOptions& options,
                                            const std::string& path);
 

@@ -6,8 +6,8 @@
 /// known), then one row a line; a second line may have the columns' units, and a line "sep=;" may stand before both.
 /// Separators , ; or tab; decimal points, or commas where none of both is meant to separate; LF or CRLF; blank lines
 /// and lines that begin with # are skipped; UTF-8 or UTF-16, gzip or zstd, told apart by the first bytes. Times are s,
-/// or dates, times of the day or durations (wall_clock.hpp), or whole counts since 1970. Fields that are not used may hold
-/// anything.
+/// or dates, times of the day or durations (wall_clock.hpp), or whole counts since 1970. Fields that are not used may
+/// hold anything.
 #pragma once
 
 #include <cstddef>

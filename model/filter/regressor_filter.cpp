@@ -10,9 +10,9 @@
 namespace wheelwright::filter {
 namespace {
 
-// L2 norms: of the errors of the samples at an edge, per unit of the edge, over that of a whole row (statistical_norms()
-// for short steps). Of speeds an edge is (1, −1) times half of it; that of angles, which is soft, is below 0.48 whatever
-// the steps.
+// L2 norms: of the errors of the samples at an edge, per unit of the edge, over that of a whole row
+// (statistical_norms() for short steps). Of speeds an edge is (1, −1) times half of it; that of angles, which is soft,
+// is below 0.48 whatever the steps.
 double roughness_per_edge(const FilterDesign& design, const Measurement& measurement) {
   constexpr double kOfSoftEdge = 0.5, kOfEdge = 0.71, kNewest = 0.68;
   const double gain = std::pow(design.alpha, design.order), step = measurement.nominal_step;

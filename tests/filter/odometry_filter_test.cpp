@@ -368,12 +368,11 @@ TEST(OdometryFilter, ADeclaredGyroIsBoundedAtEveryRate) {
       std::size_t rows = 0;
       double used = 0.0;
       for (std::size_t k = 0; k < static_cast<std::size_t>(20.0 * rate); ++k) {
-        const double t = (static_cast<double>(k) + uneven * random.uniform(-0.5, 0.5)) / rate;
+        const double t = (static_cast<double>(k) + uneven * 0.5 * random.symmetric()) / rate;
         const double right = reach * std::sin(fast * t), left = reach * std::cos(slow * t);
         const double turning =
             truth[0] * reach * fast * std::cos(fast * t) + truth[1] * reach * slow * std::sin(slow * t);
-        const std::array sample{right, left,
-                                turning + truth[2] + errors.gyro * (random.uniform(0.0, 1.0) < 0.9 ? 1.0 : -1.0)};
+        const std::array sample{right, left, turning + truth[2] + errors.gyro * (random.unit() < 0.9 ? 1.0 : -1.0)};
         if (filter.step(t, sample)) {
           const FilteredRow& row = filter.row();
           const double off = std::abs(row.y[0] - row.Y.row(0).dot(truth));
