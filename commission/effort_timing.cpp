@@ -177,6 +177,12 @@ std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s
   }
 }
 
+double told_shift(const EffortTiming& timing, double step) {
+  constexpr double kNearlyAlways = 2.0;  // standard errors
+  return std::max(kLeastShift * step, certain(timing.freedom) * timing.standard_error) +
+         kNearlyAlways * timing.standard_error;
+}
+
 bool is_latency(const EffortTiming& timing, double step) {
   const double shift = timing.beyond(), score = timing.delay < timing.allowed.lower ? -timing.score : timing.score;
   return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error && score > 1.0 &&

@@ -606,7 +606,7 @@ void check_single_efforts(LogSource& log, const commission::Setting& s, std::vec
                  .topic = FindingTopic::signals,
                  .severity = s.noise_complete ? FindingSeverity::warning : FindingSeverity::fatal};
     f.refuses = unrelated;
-    f.sentence = core::capital(c.sentence) + ".";
+    f.sentence = (unrelated ? c.sentence : core::capital(c.sentence)) + ".";  // a column keeps its spelling
     f.next = core::capital(c.next) + ".";
     f.columns = unrelated ? std::vector{c.subject} : s.measurement.effort_columns;
     f.value = c.value;
