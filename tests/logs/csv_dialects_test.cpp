@@ -109,7 +109,7 @@ struct Dialect {
   std::string separator, line_end = "\n";
   bool comma = false, quoted = false;
   std::vector<std::string> header{"t", "omega_r", "tau_r"};
-  std::string before, units;  ///< lines before and behind the header
+  std::string before{}, units{};  ///< lines before and behind the header
 };
 
 std::string written(const Dialect& d, const TimeSpelling& time) {

@@ -60,6 +60,7 @@ inline Commissioning done() {
               .largest_speed = {12.0, 11.5},
               .largest_acceleration = {8.0, 9.0},
               .sharpest_change = {9.0, 11.0},
+              .change_noise = {0.1, 0.1},
               .reversals = {4.0, 6.0}};
   commission::OutputNoise noise;
   noise.bound = 0.05;
