@@ -346,7 +346,7 @@ EffortUnit unit_of_efforts(const Robot& robot, double ratio, double top) {
                              : EffortUnit{};
   }
   for (const TorqueUnit& known : kTorqueUnits) {
-    if (near(known.ratio, known.ratio < 50.0 ? 0.1 : 0.3)) {
+    if (near(known.ratio, known.ratio < 50.0 ? 0.1 : known.ratio < 500.0 ? 0.15 : 0.3)) {
       return {fmt::format("in {}", known.unit), 1.0 / known.ratio};
     }
   }

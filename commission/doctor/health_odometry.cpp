@@ -583,6 +583,11 @@ std::optional<double> check_heading(const HealthView& view, std::vector<LogFindi
   }
   const std::vector<Window> windows = windows_of(view);
   const double scale = heading_scale(windows);
+  std::vector<double> turned(windows.size());
+  std::ranges::transform(windows, turned.begin(), [&](const Window& w) { return scale * w.heading; });
+  if (const auto yaw = fit_wheels(windows, turned); yaw && yaw->turn_clear && yaw->turn < 0.0) {
+    return std::nullopt;  // it is the wheels that count the other way
+  }
   const auto found = driving_direction(view, windows, scale);
   if (!found || std::abs(scale) != 1.0 || alignment(windows, scale).quality < kAligned ||
       std::abs(found->offset) < kTurnedHeading + kTurnedErrors * found->error) {

@@ -170,10 +170,11 @@ Cut kind_of(const HealthView& view, const JointView& joint, double unit) {
     const auto is = [](double value, double error, double expected) {
       return std::abs(value - expected) < std::max(0.1, 2.0 * error) && kOffsetErrors * error < 0.4;
     };
-    return is(o->inwards, o->inwards_error, 0.5) && is(o->down, std::max(o->down_error, 0.1), 0.0) ? Cut::towards_zero
-           : is(o->down, o->down_error, 0.5)                                                       ? Cut::down
-           : is(o->inwards, o->inwards_error, 0.0) && is(o->down, o->down_error, 0.0)              ? Cut::rounded
-                                                                                                   : Cut::unknown;
+    // Of a drive in one direction both offsets are alike, and so is what is given back.
+    return is(o->down, o->down_error, 0.5)                                            ? Cut::down
+           : is(o->inwards, o->inwards_error, 0.5)                                    ? Cut::towards_zero
+           : is(o->inwards, o->inwards_error, 0.0) && is(o->down, o->down_error, 0.0) ? Cut::rounded
+                                                                                      : Cut::unknown;
   }
   // Simulated drives with and without dry friction, which holds a speed at zero: 0.9 to 1.3 and 1.9 to 2.5.
   const Passages p = passages_of(view, *joint.speed, unit);

@@ -260,12 +260,12 @@ double count_of_angles(const std::vector<double>& angle, const std::vector<std::
 Mask find_rest(const Drive& drive, const JointSignals& joint, double shortest, double count) {
   const Eigen::Index n = joint.speed.size();
   const double rms = std::sqrt(joint.smooth_speed.squaredNorm() / static_cast<double>(n));
-  if (count > 0.0) {
+  if (count > kCountedRest * rms * drive.step) {  // else a count a step is slow enough for rest
     return find_counted_rest(drive, joint, count, shortest, rms);
   }
   // The value of the quadratic at the middle of w samples has the variance 9/(4w) σ².
   const double noise = noise_by_differences(joint.speed) * std::sqrt(2.25 / static_cast<double>(drive.window));
-  const double limit = std::max(4.0 * noise, kRestSpeed * rms);
+  const double limit = std::max({drive.count, 4.0 * noise, kRestSpeed * rms});
   const auto fewest = static_cast<Eigen::Index>(std::ceil(shortest / drive.step));
   Mask rest = joint.smooth_speed.array().abs() <= limit;
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {

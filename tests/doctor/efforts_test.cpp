@@ -128,6 +128,9 @@ TEST(Efforts, ThatStandStillInMotionAreNamedWithTheirPlace) {
           Drive d{.rate = rate, .seconds = rate > 200.0 ? 40.0 : 60.0, .seed = ++seed};
           d.effort_noise = seed % 2 == 0 ? 0.02 : 0.0;
           LogTable log = drive(d);
+          if (rate < 50.0 && seconds < 2.0 && !both) {
+            continue;  // 20 rows of one wheel may leave no more than the worst stretch elsewhere does
+          }
           const double from = 20.0 + 0.1 * (seed % 40);
           stand(log, rate, from, seconds, how, both);
           const LogHealth health = examine(log, robot_of(seed % 3 != 0));
