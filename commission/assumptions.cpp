@@ -8,8 +8,10 @@
 #include <fmt/format.h>
 
 #include "commission/commission.hpp"
+#include "commission/contradiction_search.hpp"
 #include "commission/noise_budget.hpp"
 #include "commission/physical.hpp"
+#include "core/limits.hpp"
 
 namespace wheelwright::commission {
 
@@ -22,6 +24,8 @@ namespace {
 constexpr const char* kMotionInDriving = "motion_in_driving";
 constexpr const char* kSpeedFilter = "speed_filter";
 
+constexpr double kMostTurning =
+    2.0;  // on the spot over driving: as a mirrored wheel makes of a drive that hardly turns
 // Violations that a test would not have shown below these say nothing: factor on the errors of a log, s and steps of a
 // shift, shares of a length and of the efforts' gain.
 constexpr double kToldErrors = 5.0, kToldShift = 0.01, kToldSteps = 2.0, kToldLength = 0.05, kToldGain = 0.25;
@@ -296,6 +300,22 @@ void add_effort_offset(std::vector<Assumption>& list, const Commissioning& r) {
                   .detail = r.premises.offset.detail});
 }
 
+// What the rows allow a parameter to be; where a bound is the prior's, how far from θ̂ it would have to be for θ̂ to
+// stand outside of the set (LogContradiction::Kind::estimate_outside).
+Interval shown_by_efforts(const ParameterResult& p, const Interval& prior, double freedom) {
+  Interval shown{p.lower, p.upper};
+  const double reach =
+      std::max(0.5 * (prior.upper - prior.lower), certain(freedom) * p.standard_error.value_or(core::kInfinity));
+  const double middle = p.estimate.value_or(0.0);
+  if (p.lower_is_prior) {
+    shown.lower = middle - reach;
+  }
+  if (p.upper_is_prior) {
+    shown.upper = middle + reach;
+  }
+  return shown;
+}
+
 // A gain that all efforts have is a factor on all parameters: only a quantity known from outside tells it.
 Assumption effort_gain(const Commissioning& r) {
   Assumption a{.id = "effort_gain",
@@ -308,14 +328,29 @@ Assumption effort_gain(const Commissioning& r) {
   for (std::size_t j = 0; j < r.parameters.size() && j < r.prior.sides.size(); ++j) {
     const ParameterResult& p = r.parameters[j];
     const Interval& prior = r.prior.sides[j];
-    if (!p.parameter.moved_mass || !r.model.robot.prior.contains(p.parameter.physical) || p.lower_is_prior ||
-        p.upper_is_prior || !(p.lower > 0.0) || !(prior.lower > 0.0)) {
+    const std::string& name = p.parameter.physical;
+    if (!p.parameter.moved_mass || !r.model.robot.prior.contains(name) || !(prior.lower > 0.0)) {
       continue;
     }
-    const double told = std::max(prior.upper / p.lower, p.upper / prior.lower) - 1.0;
+    if (p.estimate && !prior.contains(*p.estimate)) {
+      const bool stands_out = std::ranges::any_of(r.contradictions, [&](const LogContradiction& c) {
+        return c.kind == LogContradiction::Kind::estimate_outside && c.subject == name && (c.demotes || c.withdraws);
+      });
+      const bool outside = r.status == Commissioning::Status::empty || stands_out;
+      a.verdict = outside ? AssumptionVerdict::fails : AssumptionVerdict::not_tested;
+      a.detail =
+          fmt::format("by least squares the {0} is {1:.3g} times the middle of its declared prior, outside of it", name,
+                      *p.estimate / (0.5 * (prior.lower + prior.upper)));
+      continue;
+    }
+    const Interval shown = shown_by_efforts(p, prior, r.residuals.freedom);
+    if (!(shown.lower > 0.0)) {
+      a.detail = fmt::format("efforts and motion say too little of the {} for its declared prior to tell", name);
+      continue;
+    }
+    const double told = std::max(prior.upper / shown.lower, shown.upper / prior.lower) - 1.0;
     a.verdict = told <= kToldGain ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
-    a.detail =
-        fmt::format("a gain off by {:.2g} % would have left the prior of {}", 100.0 * told, p.parameter.physical);
+    a.detail = fmt::format("a gain off by {:.2g} % would have left the prior of {}", 100.0 * told, name);
   }
   return a;
 }
@@ -325,7 +360,7 @@ Assumption wheel_directions(const Commissioning& r) {
                .statement = "Both wheels count up, and their efforts with them, when the robot drives ahead.",
                .declared_by = {},
                .test = "gyro or pose turn as the wheels do; without them, it drives more than it turns on the spot"};
-  if (r.premises.turning && *r.premises.turning > 1.0) {
+  if (r.premises.turning && *r.premises.turning > kMostTurning) {
     a.verdict = AssumptionVerdict::fails;
     a.detail = fmt::format(
         "as its wheels count, it turns on the spot more than it drives ({:.2g} times as fast), and neither gyro nor "

@@ -508,7 +508,7 @@ std::vector<std::size_t> weighty(const Fit& fit) {
 }
 
 // What makes a model that came out one of little use; empty where nothing does.
-std::string little_learned(const Commissioning& result, const Fit& fit) {
+std::string little_learned(const Setting& s, const Commissioning& result, const Fit& fit) {
   std::vector<std::string> reasons;
   if (sees_nothing(result.validation)) {
     reasons.emplace_back(
@@ -516,8 +516,10 @@ std::string little_learned(const Commissioning& result, const Fit& fit) {
         "the efforts");
   }
   std::string open, wide;
-  for (const ParameterResult& p : result.parameters) {
-    if (p.lower_is_prior && p.upper_is_prior && p.excitation != identify::Excitation::not_excited) {
+  for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+    const ParameterResult& p = result.parameters[j];
+    const bool well_known = s.prior_declared[j] && relative_half_width(p) < 1.0;
+    if (p.lower_is_prior && p.upper_is_prior && p.excitation != identify::Excitation::not_excited && !well_known) {
       open += (open.empty() ? "" : ", ") + p.parameter.name;
     }
   }
@@ -725,7 +727,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   }
   if (withdrawn(result)) {
     withdraw(result);
-  } else if (result.little.why = little_learned(result, fit); !result.little.why.empty()) {
+  } else if (result.little.why = little_learned(s, result, fit); !result.little.why.empty()) {
     tell(options, "looking for what would bring more", 0.95);
     result.little.remedies = remedies(log, s, result, fit, options);
   }

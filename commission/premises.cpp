@@ -37,9 +37,10 @@ constexpr double kAlwaysShows = 2.0;           // standard errors beyond a limit
 constexpr double kPartOfParameter = 0.1, kPartOfEffort = 0.02;
 constexpr double kTimesOffset = 5.0;
 constexpr double kShapeOfEffort = 0.05;
-constexpr double kOpenSign = 0.1;    // of dry friction: an instant with more of it in doubt is left out
-constexpr double kRegular = 1e-9;    // reciprocal condition, columns scaled
-constexpr double kLeastSide = 0.05;  // of a log on either side of a change
+constexpr double kOpenSign = 0.1;      // of dry friction: an instant with more of it in doubt is left out
+constexpr double kRegular = 1e-9;      // reciprocal condition, columns scaled
+constexpr double kLeastSide = 0.05;    // of a log on either side of a change
+constexpr double kLevelOfTime = 7.35;  // of the likelihood ratio of a change's place at 95 % (Hansen 2000)
 
 // ω|ω| and √|ω| sgn ω of one joint, whose number is the first constant.
 model::TermValue quadratic(const model::MotionState& state, const std::array<double, 2>& joint) {
@@ -144,6 +145,11 @@ struct BlockRange {
   std::string name{};
 };
 
+// Blocks from which on other parameters fit: best, and all but as well as that.
+struct ChangePlace {
+  std::size_t best = 0, first = 0, last = 0;
+};
+
 // Least squares on a part of a log, for the columns that were kept.
 struct PartFit {
   bool usable = false;
@@ -211,8 +217,8 @@ class PremiseMoments {
   }
 
   [[nodiscard]] PartFit fit(const BlockRange& range, const Indices& kept, const Indices& offsets) const;
-  // The block from which on other parameters fit best.
-  [[nodiscard]] std::size_t change(const Indices& kept) const;
+  // Residuals are alike over `alike` instants.
+  [[nodiscard]] ChangePlace change(const Indices& kept, double alike) const;
 
  private:
   std::vector<MomentSums> blocks_;
@@ -266,11 +272,11 @@ PartFit PremiseMoments::fit(const BlockRange& range, const Indices& kept, const 
   return part;
 }
 
-std::size_t PremiseMoments::change(const Indices& kept) const {
+ChangePlace PremiseMoments::change(const Indices& kept, double alike) const {
   const MomentSums all = sums(0, blocks());
   MomentSums before = sums(0, 0);
-  std::size_t best = blocks() / 2;
-  double most = -std::numeric_limits<double>::infinity();
+  ChangePlace place{.best = blocks() / 2};
+  std::vector<double> both(blocks(), -std::numeric_limits<double>::infinity());  // explained by a change there
   const double count = instants(0, blocks());
   double seen = 0.0;
   const auto explained = [&](const Eigen::MatrixXd& YY, const Eigen::VectorXd& Yy) {
@@ -284,13 +290,20 @@ std::size_t PremiseMoments::change(const Indices& kept) const {
     if (seen < kLeastSide * count || seen > (1.0 - kLeastSide) * count) {
       continue;
     }
-    const double both = explained(before.YY, before.Yy) + explained(all.YY - before.YY, all.Yy - before.Yy);
-    if (both > most) {
-      most = both;
-      best = b + 1;
+    const double parts = explained(before.YY, before.Yy) + explained(all.YY - before.YY, all.Yy - before.Yy);
+    both[b + 1] = std::isfinite(parts) ? parts : both[b + 1];
+    place.best = both[b + 1] > both[place.best] ? b + 1 : place.best;
+  }
+  const double variance = std::max(0.0, all.yy - both[place.best]) / std::max(count, 1.0);
+  const double enough = both[place.best] - kLevelOfTime * variance * std::max(alike, 1.0);
+  place.first = place.last = place.best;
+  for (std::size_t b = 0; b < blocks(); ++b) {
+    if (both[b] >= enough) {
+      place.first = std::min(place.first, b);
+      place.last = std::max(place.last, b);
     }
   }
-  return best;
+  return place;
 }
 
 // Whether the speed of single steps, which functions of the motion are made of, is told well enough for its square.
@@ -314,6 +327,17 @@ std::optional<double> declared_offset(const Setting& s) {
 
 std::string of_itself(double share) {
   return share < 1.0 ? fmt::format("{:.2g} %", 100.0 * share) : fmt::format("{:.2g} times", share);
+}
+
+// Rows hold what the filter keeps of the time before them, and as long are their errors alike: f₂ * f₂, over its value
+// at zero, has the area 4/β, and f * f has 2/β.
+std::string time_of_change(const Setting& s, const PremiseMoments& moments, const Indices& kept) {
+  const double delay = s.filter.delay();
+  const double step = s.survey.median_step;
+  const ChangePlace place = moments.change(kept, step > 0.0 ? 2.0 * delay / step : 1.0);
+  const auto time = [&](std::size_t block) { return moments.begin_of(block) - delay; };
+  return fmt::format("one change fits best at {:.5g} s, and nearly as well from {:.5g} to {:.5g} s", time(place.best),
+                     time(place.first), time(place.last));
 }
 
 // A comparison of two parts that stands farthest outside of what it may be.
@@ -400,9 +424,9 @@ void compare_parts(const Setting& s, const Widened& w, const PremiseMoments& mom
   result.constant.verdict = AssumptionVerdict::fails;
   result.constant.detail = fmt::format(
       "the {} of the log gives {} {:.5g} ± {:.2g} {}, the {} {:.5g} ± {:.2g} {}: {:.2g} times as far apart as parts of "
-      "one robot's log may be; one change fits best at {:.5g} s",
+      "one robot's log may be; {}",
       parts[worst.a].name, words.name, words.value(from), half(a), words.unit, parts[worst.b].name, words.value(to),
-      half(b), words.unit, worst.times, moments.begin_of(moments.change(w.model)));
+      half(b), words.unit, worst.times, time_of_change(s, moments, w.model));
   out.push_back({.kind = LogContradiction::Kind::halves_disagree,
                  .withdraws = false,
                  .demotes = true,
@@ -491,6 +515,9 @@ void test_friction(const Setting& s, const Widened& w, const PremiseMoments& mom
     return;
   }
   const double effort = moments.effort(), offset = declared_offset(s).value_or(0.0);
+  // Errors that may be anything within their bound, for ever, may follow the motion and look like friction of any shape.
+  const bool averages = !s.noise_complete || s.robot.noise.effort.bias.has_value();
+  const double hidden = averages ? 0.0 : s.declared.output.minCoeff();
   const double risk = kPremiseRisk / static_cast<double>(w.shapes.size());
   const bool without_offsets = kept.size() == w.model.size() + w.shapes.size();
   double told = 0.0;
@@ -500,8 +527,9 @@ void test_friction(const Setting& s, const Widened& w, const PremiseMoments& mom
     const double reach = t * fit.error[at] + std::abs(fit.by_noise[at]) +
                          (without_offsets ? offset * fit.by_offset.row(at).cwiseAbs().sum() : 0.0);
     const double share = effort > 0.0 ? moments.column(w.shapes[k]) / effort : 0.0;
-    told = std::max(told, share * (reach + kAlwaysShows * fit.error[at]));
-    if (std::abs(fit.theta[at]) <= reach || result.friction.verdict == AssumptionVerdict::fails) {
+    told = std::max({told, share * (reach + kAlwaysShows * fit.error[at]), effort > 0.0 ? hidden / effort : 0.0});
+    if (std::abs(fit.theta[at]) <= reach || moments.column(w.shapes[k]) * std::abs(fit.theta[at]) <= hidden ||
+        result.friction.verdict == AssumptionVerdict::fails) {
       continue;
     }
     const std::string& name = w.setting.model.parameters[static_cast<std::size_t>(w.shapes[k])].name;

@@ -208,6 +208,29 @@ std::string clock_line(const EvenClock& clock) {
   return fmt::format("`clock: {{step: {:.9g}, drift: {:.2g}}}`", clock.step, 1.1 * clock.drift);
 }
 
+// Whether the motion changes by as much between rows that are close in time as between others: rows of even samples
+// that were sent together do, pieces of a recording do not.
+bool moves_evenly(const HealthView& view, double close) {
+  constexpr double kAlikeChanges = 3.0;
+  const std::vector<double>& t = view.log->t;
+  for (const JointView& joint : view.joints) {
+    const std::vector<double>* motion = joint.angle != nullptr ? joint.angle : joint.speed;
+    double near = 0.0, far = 0.0;
+    std::size_t nears = 0, fars = 0;
+    for (std::size_t k = 1; motion != nullptr && k < t.size(); ++k) {
+      const double square = std::pow((*motion)[k] - (*motion)[k - 1], 2);
+      const bool is_near = t[k] - t[k - 1] < close;
+      (is_near ? near : far) += square;
+      ++(is_near ? nears : fars);
+    }
+    if (nears > 0 && fars > 0 && near > 0.0) {
+      const double ratio = std::sqrt(far / static_cast<double>(fars) * static_cast<double>(nears) / near);
+      return ratio < kAlikeChanges && ratio > 1.0 / kAlikeChanges;
+    }
+  }
+  return true;
+}
+
 // Rows that are sent together have no times of their own.
 void check_bursts(const HealthView& view, std::vector<LogFinding>& out) {
   constexpr std::size_t kSpan = 30;
@@ -224,7 +247,7 @@ void check_bursts(const HealthView& view, std::vector<LogFinding>& out) {
   const auto close = static_cast<double>(
       std::ranges::count_if(steps, [&](double step) { return step >= 0.0 && step < kBurstTogether * mean; }));
   const double share = close / static_cast<double>(steps.size());
-  if (!(mean > 0.0) || share < 0.4) {
+  if (!(mean > 0.0) || share < 0.4 || !moves_evenly(view, kBurstTogether * mean)) {
     return;
   }
   out.push_back({.id = "time.bursts",

@@ -136,18 +136,22 @@ void JointChoice::sort_out(bool wheels, std::vector<std::string>& right, std::ve
   if (!wheels) {
     leave_where([&](const std::string& j) { return motions[j].travel < one_turn; }, "it turns by less than a turn");
   }
-  for (auto* side : {&right, &left}) {
-    const std::vector<std::string> all = *side;
-    leave_where(
-        [&](const std::string& joint) {
-          const auto own = std::ranges::find(all, joint);
-          return own != all.end() && std::any_of(all.begin(), own, [&](const std::string& other) {
-                   return publishers[other] == publishers[joint] && motions[joint].effort_varies &&
-                          is_copy(*publishers[joint], other, joint);
-                 });
-        },
-        "it repeats the other to the last digit, effort too, as of one motor (where each carries a part of its own, "
-        "effort[JOINT]*2 is their sum)");
+  for (const auto* side : {&right, &left}) {
+    for (std::size_t k = 1; k < side->size(); ++k) {
+      const std::string& joint = (*side)[k];
+      const auto other =
+          std::find_if(side->begin(), side->begin() + static_cast<std::ptrdiff_t>(k), [&](const auto& o) {
+            return publishers[o] == publishers[joint] && motions[joint].effort_varies &&
+                   is_copy(*publishers[joint], o, joint);
+          });
+      if (other != side->begin() + static_cast<std::ptrdiff_t>(k)) {
+        const char* of = side == &right ? "r" : "l";
+        say(fmt::format(
+            "{}: {} and {} hold the same numbers to the last digit: taken for two motors, whose efforts are added; "
+            "where one motor drives both, --map \"tau_{}=effort[{}]\" takes it once",
+            view_.topic->name, *other, joint, of, *other));
+      }
+    }
   }
 }
 

@@ -31,7 +31,7 @@ class JointChoice {
   /// Contradicts where steering joints move.
   void tell_steering();
   /// Takes joints away from sides that have several: those that stand still while others turn, have no effort that
-  /// changes beside others that have one, repeat another to the last digit, or, unless they are `wheels` by their
+  /// changes beside others that have one, or, unless they are `wheels` by their
   /// names, turn by less than a turn. Throws InputError where the joints are wheels of several robots that move.
   void sort_out(bool wheels, std::vector<std::string>& right, std::vector<std::string>& left);
   /// Of a source whose columns are chosen: contradicts where wheels of a side do not turn as one; takes away angles

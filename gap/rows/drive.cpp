@@ -20,6 +20,7 @@ namespace {
 
 constexpr double kUneven = 0.01;        // share of the median step
 constexpr double kRestSpeed = 0.01;     // of the root mean square of the speed
+constexpr double kCoarse = 0.2;         // likewise: a count a step that is no slower than this is no rest
 constexpr double kCountedRest = 0.05;   // likewise, of an encoder of which a count in the shortest rest is faster
 constexpr std::size_t kFewestRows = 3;  // of a segment
 
@@ -260,7 +261,7 @@ double count_of_angles(const std::vector<double>& angle, const std::vector<std::
 Mask find_rest(const Drive& drive, const JointSignals& joint, double shortest, double count) {
   const Eigen::Index n = joint.speed.size();
   const double rms = std::sqrt(joint.smooth_speed.squaredNorm() / static_cast<double>(n));
-  if (count > kCountedRest * rms * drive.step) {  // else a count a step is slow enough for rest
+  if (count > kCoarse * rms * drive.step) {
     return find_counted_rest(drive, joint, count, shortest, rms);
   }
   // The value of the quadratic at the middle of w samples has the variance 9/(4w) σ².

@@ -99,10 +99,10 @@ struct DriveOptions {
 /// - Smooth signals are those of a local quadratic over `smoothing_window` (Savitzky and Golay 1964), fitted
 ///   one-sidedly at the ends of a segment and never across them.
 /// - Unsigned efforts take the sign of their joint's motion.
-/// - A joint whose encoder is known, or found in its angles, stands still where its angle stays within one count for
-///   `shortest_rest`, or for as long as makes a count slower than 5 % of its root mean square. Any other does where its
-///   smooth speed stays below four standard deviations of its noise or 1 % of its root mean square, whichever is
-///   larger, for `shortest_rest`.
+/// - A joint stands still where its smooth speed stays below `count`, four standard deviations of its noise or
+///   1 % of its root mean square, whichever is largest, for `shortest_rest`. One of whose encoder a count a step is
+///   faster than 20 % of its root mean square does where its angle stays within one count for `shortest_rest`, or for
+///   as long as makes a count slower than 5 %.
 ///
 /// Throws InvalidArgument when `log` lacks a column of `measurement` or has no segment of three samples.
 [[nodiscard]] Drive make_drive(const LogTable& log, const Robot& robot, const Measurement& measurement,

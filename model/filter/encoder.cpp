@@ -17,7 +17,7 @@ constexpr std::size_t kFewestCounts = 8;   // different numbers of counts: a dri
 constexpr double kSharp = 0.01;            // with less of either, how near N and the counts must be to whole numbers
 constexpr std::size_t kFewestOfAll = 4;    // of numbers of counts that leave no great gaps: such speeds are a lattice
 constexpr double kDense = 3.0;             // of these, the largest number of counts
-constexpr double kLittleRounding = 0.05;   // of a count, of a lattice
+constexpr double kLittleRounding = 0.015;  // of a count, of a lattice
 constexpr double kMostCounts = 4194304.0;  // 2^22
 
 double turn_over(double quantum, double step) { return 2.0 * std::numbers::pi / (quantum * step); }

@@ -210,14 +210,40 @@ TEST(Premises, AMassThatGrowsHalfWayIsToldWithItsTime) {
       ASSERT_NE(found, nullptr) << gained << " " << c.message;
       EXPECT_EQ(found->subject, "mass");
       EXPECT_NEAR(found->value, 24.0 * gained, 0.3 * 24.0 * gained);
-      if (gained > 0.02) {
-        EXPECT_THAT(found->sentence, AnyOf(HasSubstr("at 29."), HasSubstr("at 30."))) << found->sentence;
-      }
       EXPECT_EQ(of(c, "constant_parameters").verdict, Verdict::fails);
       EXPECT_NE(c.model.warrant, core::Warrant::guaranteed);
       EXPECT_THAT(c.message, HasSubstr("nothing is called guaranteed"));
     }
   }
+}
+
+// A change shows where the robot speeds up: the first drive hardly does from 27 to 36 s, so that only a range of times
+// can be told. Most tell it to a few blocks of 0.08 s, since the filter's delay is taken out.
+TEST(Premises, AChangeIsDatedAsWellAsTheDriveShowsIt) {
+  const auto number_after = [](const std::string& text, const std::string& word) {
+    const std::size_t at = text.find(word);
+    return at == std::string::npos ? -1.0 : std::stod(text.substr(at + word.size()));
+  };
+  constexpr double kTruth = 30.0, kTwoBlocks = 0.16;
+  std::vector<double> errors;
+  for (std::uint32_t seed = 1; seed <= 7; ++seed) {
+    World world;
+    world.mass_gained = 0.03;
+    world.seed = seed;
+    const Commissioning c = commissioned(world, robot_of(world));
+    const LogContradiction* found = find(c, Kind::halves_disagree);
+    ASSERT_NE(found, nullptr) << c.message;
+    const double best = number_after(found->sentence, "fits best at ");
+    const double first = number_after(found->sentence, " from "), last = number_after(found->sentence, " to ");
+    EXPECT_GE(kTruth, first - kTwoBlocks) << found->sentence;
+    EXPECT_LE(kTruth, last + kTwoBlocks) << found->sentence;
+    EXPECT_LE(first, best);
+    EXPECT_LE(best, last);
+    EXPECT_LT(last - first, 15.0) << found->sentence;
+    errors.push_back(std::abs(best - kTruth));
+  }
+  std::ranges::sort(errors);
+  EXPECT_LT(errors[errors.size() / 2], 0.3);
 }
 
 TEST(Premises, AnOffsetIsHeldAgainstTheDeclaredBias) {
@@ -251,14 +277,12 @@ TEST(Premises, FrictionOfAnotherShapeIsTold) {
 // What the log could not have contradicted does not hold.
 TEST(Premises, HoldOnlyWhereAViolationWouldHaveShown) {
   World world;
-  const Commissioning rich = commissioned(world, robot_of(world));
+  // An offset of the efforts as large as the bound looks like viscous friction where the halves drive differently.
+  EXPECT_EQ(of(commissioned(world, robot_of(world)), "constant_parameters").verdict, Verdict::not_tested);
+  const Commissioning rich = commissioned(world, robot_of(world, 0.002));
   EXPECT_EQ(of(rich, "constant_parameters").verdict, Verdict::holds) << of(rich, "constant_parameters").detail;
   EXPECT_THAT(of(rich, "constant_parameters").detail, HasSubstr("would have shown"));
   EXPECT_EQ(of(rich, "effort_gain").verdict, Verdict::not_tested);
-  Robot weighed = robot_of(world);
-  weighed.prior["mass"] = {23.0, 25.0};
-  const Commissioning known = commissioned(world, weighed);
-  EXPECT_EQ(of(known, "effort_gain").verdict, Verdict::holds) << of(known, "effort_gain").detail;
   // Eight seconds of motion under large errors.
   World poor = world;
   poor.seconds = 8.0;
@@ -267,6 +291,29 @@ TEST(Premises, HoldOnlyWhereAViolationWouldHaveShown) {
   const Commissioning c = commissioned(poor, robot_of(poor));
   for (const char* id : {"constant_parameters", "friction_shape"}) {
     EXPECT_EQ(of(c, id).verdict, Verdict::not_tested) << id << ": " << of(c, id).detail;
+  }
+}
+
+// Priors of a mass of 24 kg: wider than what the rows leave, narrower, and elsewhere.
+TEST(Premises, AWeighedMassTellsAGainOfTheEfforts) {
+  const World world;
+  const auto weighed = [&](Interval mass) {
+    Robot robot = robot_of(world);
+    robot.prior["mass"] = mass;
+    return commissioned(world, robot);
+  };
+  for (const Interval mass : {Interval{22.0, 26.0}, Interval{23.0, 25.0}, Interval{23.8, 24.3}}) {
+    const Commissioning c = weighed(mass);
+    EXPECT_EQ(of(c, "effort_gain").verdict, Verdict::holds) << of(c, "effort_gain").detail;
+    EXPECT_TRUE(c.little.why.empty()) << c.message;
+    EXPECT_EQ(c.model.warrant, core::Warrant::guaranteed) << failing(c);
+  }
+  const Commissioning vague = weighed({12.0, 48.0});
+  EXPECT_EQ(of(vague, "effort_gain").verdict, Verdict::not_tested) << of(vague, "effort_gain").detail;
+  for (const Interval mass : {Interval{26.0, 28.0}, Interval{24.6, 26.0}}) {
+    const Commissioning c = weighed(mass);
+    EXPECT_EQ(of(c, "effort_gain").verdict, Verdict::fails) << of(c, "effort_gain").detail;
+    EXPECT_NE(c.model.warrant, core::Warrant::guaranteed);
   }
 }
 
@@ -295,10 +342,10 @@ TEST(Premises, ErrorsThatDoNotAverageTakeTheWordGuaranteedAway) {
   EXPECT_EQ(c.model.assumptions, c.assumptions);
 }
 
-// A command that may change anywhere between two samples of 0.1 s, in a drive of short pushes.
+// A command that may change anywhere between two samples of a quarter of a second.
 TEST(Premises, WhereLittleIsLearntTheRemedyIsNamedWithWhatItBrings) {
   World world;
-  world.rate = 10.0;
+  world.rate = 4.0;
   Robot robot = robot_of(world);
   robot.effort_changes = model::EffortChanges::between;
   const Commissioning c = commissioned(world, robot);

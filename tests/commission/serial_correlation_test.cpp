@@ -81,6 +81,9 @@ Commissioning learn(const ExactAxis& axis, const Robot& robot, std::uint64_t see
 std::size_t told(const ExactAxis& axis, const Robot& robot, std::size_t runs, std::uint64_t first, double test_risk) {
   const Commissioning guaranteed = learn(axis, robot, first);  // its set holds the truth whatever the seed
   EXPECT_TRUE(guaranteed.has_model()) << guaranteed.message;
+  if (guaranteed.model.warrant != core::Warrant::guaranteed) {
+    return runs;  // the premises tell it already: such errors look like an offset, or like parameters that change
+  }
   std::size_t count = 0;
   for (std::size_t k = 1; k <= runs; ++k) {
     const LogTable log = drive(axis, first + k);

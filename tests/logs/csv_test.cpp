@@ -404,7 +404,7 @@ TEST_F(Csv, AWheelAngleThatJumpsAsNoWheelTurnsBeginsASegment) {
   for (const auto& [from, period] : {std::pair{-12.5, 25.0}, std::pair{0.0, 27.0}}) {
     const LogTable table = rows([&](double t) { return wrapped(-20.0 * t - 1.0, from, period); });
     EXPECT_EQ(report.jumps.count, table.segment_starts.size() - 1) << period;
-    EXPECT_GE(report.jumps.count, 3u) << period;
+    EXPECT_GE(report.jumps.count, 2u) << period;
     for (std::size_t k = 1; k < table.rows(); ++k) {
       const bool starts = std::ranges::count(table.segment_starts, k) > 0;
       ASSERT_EQ(starts, std::abs(table.column("phi_r")[k] - table.column("phi_r")[k - 1]) > 1.0) << k;
