@@ -515,7 +515,8 @@ void test_friction(const Setting& s, const Widened& w, const PremiseMoments& mom
     return;
   }
   const double effort = moments.effort(), offset = declared_offset(s).value_or(0.0);
-  // Errors that may be anything within their bound, for ever, may follow the motion and look like friction of any shape.
+  // Errors that may be anything within their bound, for ever, may follow the motion and look like friction of any
+  // shape.
   const bool averages = !s.noise_complete || s.robot.noise.effort.bias.has_value();
   const double hidden = averages ? 0.0 : s.declared.output.minCoeff();
   const double risk = kPremiseRisk / static_cast<double>(w.shapes.size());

@@ -31,6 +31,8 @@ encoder_counts_per_turn: 4096
 speed_source: encoder_difference
 speed_filter: {kind: mean, time: [0.04, 0.05], found: true}
 speed_cut: {unit: 0.1, towards: below}
+clock: {step: 0.01, drift: 1e-6}
+heading_offset: -0.7
 pose_source: independent
 limits:  {effort: 6.0, speed: 2}
 motor: {torque_constant: 0.0105, resistance: 3.3, back_emf: 0.0105, gear_ratio: 9.69}
@@ -67,6 +69,10 @@ TEST(RobotFile, ReadsEveryKey) {
   EXPECT_EQ(robot.speed_filter,
             (model::SpeedFilter{.kind = model::SpeedFilterKind::mean, .time = {0.04, 0.05}, .found = true}));
   EXPECT_EQ(robot.speed_cut, (model::SpeedCut{.unit = 0.1, .down = true}));
+  EXPECT_EQ(robot.heading_offset, -0.7);
+  ASSERT_TRUE(robot.clock);
+  EXPECT_EQ(robot.clock->step, 0.01);
+  EXPECT_EQ(robot.clock->drift, 1e-6);
   EXPECT_EQ(robot.limits.at("effort"), 6.0);
   EXPECT_EQ(robot.limits.at("speed"), 2.0);
   EXPECT_EQ(robot.motor.value().gear_ratio, 9.69);
@@ -217,7 +223,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"filter: {order: 1.5}", "filter.order: '1.5': expected 1, 2 or auto"},
         Bad{"filter: {alpha: 0}", "filter.alpha: '0': expected a rate > 0 in 1/s, or auto"},
         Bad{"encoder_counts_per_turn: 0", "encoder_counts_per_turn: '0': expected a number > 0"},
-        Bad{"speed_filter: {kind: lag}", "speed_filter: expected the key time"},
+        Bad{"speed_filter: {kind: lag}", "speed_filter: a mapping: expected the key time"},
         Bad{"speed_filter: {time: 20}", "speed_filter.time: '20': expected seconds > 0 and at most 1"},
         Bad{"speed_filter: {time: [0.03, 0.02]}", "speed_filter.time: '0.02': expected seconds > 0 and at most 1"},
         Bad{"speed_cut: {towards: up}", "speed_cut.towards: 'up': expected one of zero, below"},

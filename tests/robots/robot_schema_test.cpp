@@ -43,6 +43,8 @@ TEST(RobotSchema, CoversWhatIsWritten) {
   robot.pose_source = model::PoseSource::independent;
   robot.speed_filter = {.time = {0.02, 0.03}};
   robot.speed_cut = {.unit = 0.1};
+  robot.clock = EvenClock{.step = 0.01, .drift = 1e-6};
+  robot.heading_offset = 0.7;
   robot.limits["effort"] = 1.0;
   robot.motor.emplace();
   robot.kinematic_window = 0.5;
