@@ -555,7 +555,7 @@ void check_delay(const HealthView& view, LogSource& log, const commission::Setti
   f.sentence = declared_delay != Interval{} && timing->beyond() == 0.0
                    ? fmt::format("The effort comes {:.2g} ± {:.1g} s {} the motion (95 %), as the robot file allows.",
                                  std::abs(delay), 2.0 * error, delay > 0.0 ? "after" : "before")
-               : matters
+               : matters || taken
                    ? fmt::format(
                          "The effort comes {:.2g} ± {:.1g} s {} the motion (95 %); shifted by that, {:.0f} % of the "
                          "residual are left.",
