@@ -356,10 +356,12 @@ Assumption effort_gain(const Commissioning& r) {
 }
 
 Assumption wheel_directions(const Commissioning& r) {
-  Assumption a{.id = "wheel_directions",
-               .statement = "Both wheels count up, and their efforts with them, when the robot drives ahead.",
-               .declared_by = {},
-               .test = "gyro or pose turn as the wheels do; without them, it drives more than it turns on the spot"};
+  Assumption a{
+      .id = "wheel_directions",
+      .statement = "Both wheels count up, and their efforts with them, when the robot drives ahead.",
+      .declared_by = {},
+      .test =
+          "gyro or pose turn as the wheels do; without them, it turns on the spot at most twice as much as it drives"};
   if (r.premises.turning && *r.premises.turning > kMostTurning) {
     a.verdict = AssumptionVerdict::fails;
     a.detail = fmt::format(
