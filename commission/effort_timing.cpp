@@ -78,8 +78,11 @@ double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
   return limit > 0.0 ? from.more.dot(from.residual) / limit : 0.0;
 }
 
-// The rows as logged, without bounds on their errors; nothing where they are too few.
+// The rows as logged, without bounds on their errors; nothing where they are too few, or efforts have no sign.
 std::optional<RegressionBlock> rows_as_logged(LogSource& log, const Setting& s, std::size_t most_rows) {
+  if (s.measurement.effort_unsigned) {
+    return std::nullopt;
+  }
   Setting as_logged = s;  // a declared delay is compared with what is found, not taken away before
   as_logged.measurement.delay = {0.0, 0.0};
   TorqueRows stream = make_rows(log, as_logged, errors_of_fit(s));
@@ -94,9 +97,6 @@ std::optional<RegressionBlock> rows_as_logged(LogSource& log, const Setting& s, 
 
 std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, const Fit& fit, double longest,
                                           std::size_t most_rows) {
-  if (s.measurement.effort_unsigned) {
-    return std::nullopt;
-  }
   const std::optional<RegressionBlock> rows = rows_as_logged(log, s, most_rows);
   if (!rows) {
     return std::nullopt;
@@ -155,9 +155,6 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
 
 std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s, const Fit& fit, double longest,
                                                 std::size_t most_rows) {
-  if (s.measurement.effort_unsigned) {
-    return std::nullopt;
-  }
   const std::optional<RegressionBlock> rows = rows_as_logged(log, s, most_rows);
   if (!rows) {
     return std::nullopt;

@@ -51,14 +51,6 @@ double share_of(const std::vector<double>& values, auto&& test) {
   return static_cast<double>(std::ranges::count_if(values, test)) / static_cast<double>(values.size());
 }
 
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1));
-  return core::order_statistic(std::move(values), rank);
-}
-
 void one_way(const char* id, const char* what, const char* plus, const char* minus, double p, double m,
              FindingSeverity severity, std::vector<LogFinding>& out) {
   if (p > kSome && m > kSome) {

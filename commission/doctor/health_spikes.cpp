@@ -19,14 +19,6 @@ constexpr double kEffortShare = 3.0;       // of that of efforts, which a contro
 constexpr double kBackAgain = 0.5;         // of the jump, by which the row after may differ from the row before
 constexpr std::size_t kLongestSpike = 2;   // rows
 
-double sorted_at(std::vector<double> values, double q) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1));
-  return core::order_statistic(std::move(values), rank);
-}
-
 // Rows of `column` that lie far off those before and after.
 std::vector<bool> spikes_of(const HealthView& view, const std::vector<double>& column, double share) {
   std::vector<double> changes, sizes;
@@ -39,7 +31,7 @@ std::vector<bool> spikes_of(const HealthView& view, const std::vector<double>& c
     }
   }
   const double least =
-      std::max(kTimesTheirUsual * sorted_at(std::move(changes), 0.99), share * sorted_at(std::move(sizes), 0.999));
+      std::max(kTimesTheirUsual * quantile(std::move(changes), 0.99), share * quantile(std::move(sizes), 0.999));
   std::vector<bool> flagged(column.size(), false);
   if (!(least > 0.0)) {
     return flagged;
