@@ -503,7 +503,7 @@ void fill(FaultSignals& signals, const double* from) {
 void FaultFilter::begin(std::size_t onset) {
   begin_filter(onset);
   elements_.begin(onset);
-  const double held = motion_->held(onset);
+  const double held = motion_->held_jump(onset);
   const FaultSignals& jumps = elements_.jump();
   const std::size_t size = static_cast<std::size_t>(jumps.g1.size());
   const auto jump = [&](std::size_t e, double by) {

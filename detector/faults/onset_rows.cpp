@@ -109,7 +109,7 @@ core::RowMatrix OnsetRows::jump(std::size_t k) const {
   for (const Term& term : model_->terms) {
     if (term.kind == Term::Kind::acceleration) {
       out(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter)) +=
-          motion_->held(k) * term.scale * moved[static_cast<Eigen::Index>(term.coordinate)];
+          motion_->held_jump(k) * term.scale * moved[static_cast<Eigen::Index>(term.coordinate)];
     }
   }
   return out;

@@ -222,6 +222,47 @@ TEST(FaultRows, OfBrokenSensorsAreThoseOfFalsifiedLogs) {
   }
 }
 
+// The healthy log without the rows at `lost` (samples after the onset), and what encoders that count wrong make of it.
+double error_beside_a_loss(Shown shown, const std::vector<int>& lost, double rate) {
+  const Prepared s = prepared(shown, rate);
+  Simulation simulation(s.scenario);
+  LogTable table = read_all(simulation);
+  const auto onset_in = [](const LogTable& log) {
+    return std::lower_bound(log.t.begin(), log.t.end(), kOnset - 1e-9) - log.t.begin();
+  };
+  const auto onset = onset_in(table);
+  for (auto each = lost.rbegin(); each != lost.rend(); ++each) {
+    table.t.erase(table.t.begin() + onset + *each);
+    for (std::vector<double>& column : table.columns) {
+      column.erase(column.begin() + onset + *each);
+    }
+  }
+  const RegressorFilter exact = filter_of(s.scenario);
+  filter::SignalErrors errors = exact.errors();
+  errors.bridges = true;
+  const RegressorFilter filter(s.model, s.design, exact.measurement(), errors);
+  TableSource healthy(table);
+  const ReferenceMotion motion = read_reference(healthy, filter);
+  LogTable broken = table;
+  const bool speeds = shown == Shown::speeds;
+  (speeds ? scale("omega_r", 1.1) : count("phi_r", 1.1, 1e9))(broken, static_cast<std::size_t>(onset_in(table)));
+  TableSource source(broken);
+  const ReferenceMotion log = read_reference(source, filter);
+  EXPECT_EQ(motion.segment_starts.size(), 1u);
+  return mismatch(find_fault(s.model, "encoder_scale_right"), 0.1, motion, log, s.model, s.design, s.theta, 0.0).seen;
+}
+
+// A speed jumps in the step that ends at the sample of the onset, and rows hold the jump if that step is known.
+TEST(FaultRows, BesideLostRowsAreThoseOfFalsifiedLogs) {
+  for (const Shown shown : {Shown::speeds, Shown::angles}) {
+    for (const std::vector<int>& lost : std::vector<std::vector<int>>{{}, {-1}, {1}, {-1, 1}, {2}, {-2}}) {
+      const double coarse = error_beside_a_loss(shown, lost, 200.0);
+      EXPECT_LT(coarse, 0.1) << testing::PrintToString(lost);
+      EXPECT_LT(error_beside_a_loss(shown, lost, 800.0), coarse / 3.0 + 1e-9) << testing::PrintToString(lost);
+    }
+  }
+}
+
 // A reading that stands still, and mass that is lost, by closed forms at a constant speed: torque f·v·r on both wheels.
 TEST(FaultRows, SettleToClosedForms) {
   const Prepared s = prepared(Shown::angles, 100.0);
