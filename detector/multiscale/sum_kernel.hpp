@@ -85,11 +85,6 @@ class KernelSums {
       power *= x / static_cast<double>(i + 1);
     }
   }
-  /// Takes away signals of the age 0.
-  template <typename Signals>
-  void take_away(const Signals& q) {
-    states_[0] -= q;
-  }
   [[nodiscard]] double value(Eigen::Index row, Eigen::Index column, const SumKernel::Shape& shape) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < SumKernel::kStates; ++i) {

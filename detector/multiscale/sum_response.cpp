@@ -369,25 +369,21 @@ SumResponse::SumResponse(FaultType fault, const OnlineModel& model, const Refere
 }
 
 // The newest element's signals; `last` is the signature at the end of the one before: g1, g2 and c.
-void SumResponse::take(const FaultElements& elements, bool first, Eigen::Ref<Eigen::MatrixXd> last) {
-  const FaultSignals &begin = elements.at_begin(), &end = elements.at_end(), &jump = elements.jump();
+void SumResponse::take(const FaultElements& elements, Eigen::Ref<Eigen::MatrixXd> last) {
+  const FaultSignals &begin = elements.at_begin(), &end = elements.at_end();
   const std::array<double, 2>& shares = elements.shares();
   const double length = shares[0] + shares[1];
   signals_.setZero();
   Eigen::VectorXd effort = shares[0] * begin.c.cwiseAbs() + shares[1] * end.c.cwiseAbs();
-  const auto fill = [&](Eigen::Index at, const core::RowMatrix& from, const core::RowMatrix& to,
-                        const core::RowMatrix* impulse, double times) {
+  const auto fill = [&](Eigen::Index at, const core::RowMatrix& from, const core::RowMatrix& to, double times) {
     if (at >= 0) {
       signals_.middleCols(at, p_) = shares[0] * from + shares[1] * to;
       effort += times * (shares[0] * from.cwiseAbs() + shares[1] * to.cwiseAbs()) * largest_;
-      if (first && impulse != nullptr) {
-        signals_.middleCols(at, p_) += *impulse;
-      }
     }
   };
-  fill(g1_, begin.g1, end.g1, &jump.g1, 1.0);
-  fill(g2_, begin.g2, end.g2, nullptr, most_kappa_);
-  fill(s_, begin.s, end.s, &jump.s, 1.0);
+  fill(g1_, begin.g1, end.g1, 1.0);
+  fill(g2_, begin.g2, end.g2, most_kappa_);
+  fill(s_, begin.s, end.s, 1.0);
   if (c_ >= 0) {
     signals_.col(c_) = shares[0] * begin.c + shares[1] * end.c;
     signals_.col(0) = signals_.col(c_);
@@ -415,6 +411,18 @@ void SumResponse::take(const FaultElements& elements, bool first, Eigen::Ref<Eig
         0.5 * static_cast<double>(motion_->effort_reach) * length *
         ((change.leftCols(p_) + most_kappa_ * change.middleCols(p_, p_)) * largest_ + change.col(2 * p_));
     last = to;
+  }
+}
+
+// What the motion jumps by at the onset, beside the signals.
+void SumResponse::add_jump(const FaultSignals& jump) {
+  if (g1_ >= 0) {
+    signals_.middleCols(g1_, p_) += jump.g1;
+    signals_.col(0) += jump.g1 * model_->estimate;
+  }
+  if (s_ >= 0) {
+    signals_.middleCols(s_, p_) += jump.s;
+    signals_.col(0) -= jump.s * model_->estimate;
   }
 }
 
@@ -457,14 +465,14 @@ void SumResponse::walk(std::span<const std::size_t> onsets, double within,
         }
       };
       if (stationary_) {
-        take(broken, false, last);
+        take(broken, last);
         added = std::max(added, added_);
         weigh(k);
         add(shared_);
       } else {
         for (Active& each : active) {
           each.elements->next();
-          take(*each.elements, false, each.last);
+          take(*each.elements, each.last);
           each.added = std::max(each.added, added_);
           weigh(k);
           add(each.sums);
@@ -478,19 +486,31 @@ void SumResponse::walk(std::span<const std::size_t> onsets, double within,
         fresh.elements.emplace(fault_, model_->model, model_->filter.static_gain(), *motion_);
         fresh.elements->begin(k - 1);
         fresh.elements->next();
-        take(*fresh.elements, true, fresh.last);
+        take(*fresh.elements, fresh.last);
         fresh.added = added_;
+        const FaultSignals jump = fresh.elements->jump();
+        // A speed jumps in the step that ends at the onset, an angle's slope at its sample.
+        const bool before = motion_->kind == MotionKind::speed;
+        if (!before) {
+          add_jump(jump);
+        }
         weigh(k);
+        const double sign = stationary_ ? -1.0 : 1.0;
         if (stationary_) {
           fresh.sums = shared_;
-          for (KernelSums& sums : fresh.sums) {
-            sums.take_away(q_);
-          }
           fresh.elements.reset();
         } else {
           fresh.sums.assign(scales.size(), KernelSums(W_, columns_));
-          for (KernelSums& sums : fresh.sums) {
-            sums.add(q_);
+        }
+        for (KernelSums& sums : fresh.sums) {
+          sums.add(sign * q_);
+        }
+        if (before) {
+          signals_.setZero();
+          add_jump(jump);
+          weigh(k - 1);
+          for (std::size_t j = 0; j < scales.size(); ++j) {
+            fresh.sums[j].add(sign * q_, decays.x[j], decays.decay[j], columns_);
           }
         }
         active.push_back(std::move(fresh));
@@ -529,7 +549,7 @@ void SumResponse::walk_broken(const std::function<void(const At&)>& visit) {
     Active always{s, start + 1, motion_->instant[start], {}, {}, Eigen::MatrixXd::Zero(n_, 2 * p_ + 1), 0.0};
     for (std::size_t k = start + 1; k < end && broken.next(); ++k) {
       decays.step_to(drive_->step[k], scales);
-      take(broken, false, always.last);
+      take(broken, always.last);
       always.added = std::max(always.added, added_);
       weigh(k);
       for (std::size_t j = 0; j < scales.size(); ++j) {

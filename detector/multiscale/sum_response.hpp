@@ -137,7 +137,8 @@ class SumResponse {
   [[nodiscard]] SumRow row(const At& at) const;
   [[nodiscard]] std::size_t end_of(std::size_t segment) const;
   void visit_look(std::size_t which, const Active& active, const std::function<void(const At&)>& visit) const;
-  void take(const FaultElements& elements, bool first, Eigen::Ref<Eigen::MatrixXd> last);
+  void take(const FaultElements& elements, Eigen::Ref<Eigen::MatrixXd> last);
+  void add_jump(const FaultSignals& jump);
   void weigh(std::size_t instant);
   [[nodiscard]] double value(const At& at, Eigen::Index weight, Eigen::Index column) const;
   void add_errors(const At& at, SumRow& row) const;

@@ -78,22 +78,21 @@ struct Agreement {
   double radius = 0.0, difference = 0.0, response = 0.0;
 };
 
-std::map<std::pair<std::size_t, std::size_t>, Agreement> compare(const FaultyRun& run, double magnitude) {
-  OnlineModel model = run.robot->model;
-  model.measurement.count = 0.0;  // nothing is rounded here
-  const LogTable faulty = log_of(run, magnitude, false);
-  const LogTable healthy = run.simulated ? faulty : log_of(run, 0.0, false);
+using Agreements = std::map<std::pair<std::size_t, std::size_t>, Agreement>;
+
+// `kappa` of `fault` from instant `onset` on; without the sensors' errors.
+Agreements compare(const OnlineModel& model, const Eigen::VectorXd& truth, const LogTable& healthy,
+                   const LogTable& faulty, const model::FaultType& fault, double kappa, std::size_t onset) {
   const ReferenceMotion motion = motion_of(healthy, model);
   TableSource source(healthy);
   const auto drive = read_sum_drive(source, model, motion, {.any_log = false});
   EXPECT_TRUE(drive);
   const std::vector<SumState> looks = looks_of(faulty, model);
   EXPECT_EQ(looks.size(), drive->looks.size());
-  const Eigen::VectorXd truth = sim::true_parameters(run.drive, model.model), estimate = model.estimate;
-  const double kappa = run.fault.kappa(magnitude);
-  std::map<std::pair<std::size_t, std::size_t>, Agreement> all;
-  const std::vector<std::size_t> onsets{first_instant(run, motion)};
-  SumResponse response(run.fault, model, motion, *drive);
+  const Eigen::VectorXd estimate = model.estimate;
+  Agreements all;
+  const std::vector<std::size_t> onsets{onset};
+  SumResponse response(fault, model, motion, *drive);
   std::size_t visited = 0;
   response.walk(onsets, 12.0, [&](const SumResponse::At& at) {
     const SumRow row = at.row();
@@ -112,6 +111,15 @@ std::map<std::pair<std::size_t, std::size_t>, Agreement> compare(const FaultyRun
   return all;
 }
 
+Agreements compare(const FaultyRun& run, double magnitude) {
+  OnlineModel model = run.robot->model;
+  model.measurement.count = 0.0;  // nothing is rounded here
+  const LogTable faulty = log_of(run, magnitude, false);
+  const LogTable healthy = run.simulated ? faulty : log_of(run, 0.0, false);
+  return compare(model, sim::true_parameters(run.drive, model.model), healthy, faulty, run.fault,
+                 run.fault.kappa(magnitude), first_instant(run, motion_of(healthy, model)));
+}
+
 double size_of(const FaultyRun& run) {
   return run.fault.unit == "1" ? 0.1 : run.fault.name.starts_with("effort") ? 0.3 : 0.2;
 }
@@ -127,6 +135,51 @@ TEST(SumResponse, IsWhatFaultsDoToTheSums) {
             << breakage.fault << ", weight " << sum.first << ", scale " << sum.second << ", seed " << seed << ": "
             << agreement.response;
       }
+    }
+  }
+}
+
+// Speeds that jump beside a lost row: the sums hold the jump where the step that ends at its sample is known.
+TEST(SumResponse, OfSpeedsThatJumpBesideLostRows) {
+  Commissioned robot{testing_support::random_robot(3), {}};
+  Scenario& s = robot.scenario;
+  s.duration = 30.0;
+  s.rate = 100.0;
+  s.robot.effort_changes = model::EffortChanges::at_samples;
+  s.robot.noise.effort.bias = 0.0;
+  s.robot.encoder_counts_per_turn.reset();
+  s.sensors.encoder_counts_per_turn.reset();
+  s.sensors.angles = false;
+  s.sensors.speeds = true;
+  s.sensors.wheel_speed = 0.002;
+  s.robot.noise.wheel_speed.value = 0.002;
+  Simulation learned(s);
+  const Commissioning result = commission_robot(learned, s.robot);
+  ASSERT_TRUE(result.model.at_risk) << result.message;
+  const OnlineModel& model = result.model;
+  s.sensors.wheel_speed = s.sensors.effort = 0.0;
+  s.duration = 20.0;
+  Simulation exact(s);
+  const LogTable whole = read_all(exact);
+  const model::FaultType fault =
+      model::find_fault(model::fault_catalogue(model.model, model.estimate), "encoder_scale_right");
+  for (const std::vector<std::size_t>& lost : std::vector<std::vector<std::size_t>>{{}, {999}, {1001}, {999, 1001}}) {
+    LogTable healthy = whole;
+    for (auto row = lost.rbegin(); row != lost.rend(); ++row) {
+      healthy.t.erase(healthy.t.begin() + static_cast<std::ptrdiff_t>(*row));
+      for (std::vector<double>& column : healthy.columns) {
+        column.erase(column.begin() + static_cast<std::ptrdiff_t>(*row));
+      }
+    }
+    const auto onset = static_cast<std::size_t>(std::ranges::lower_bound(healthy.t, whole.t[1000]) - healthy.t.begin());
+    LogTable faulty = healthy;
+    std::vector<double>& speed = faulty.column("omega_r");
+    std::for_each(speed.begin() + static_cast<std::ptrdiff_t>(onset), speed.end(), [](double& x) { x *= 1.1; });
+    const Eigen::VectorXd truth = sim::true_parameters(s, model.model);
+    for (const auto& [sum, agreement] : compare(model, truth, healthy, faulty, fault, fault.kappa(0.1), onset)) {
+      EXPECT_LE(agreement.difference, 0.002 * agreement.response + 0.002 * agreement.radius)
+          << "weight " << sum.first << ", scale " << sum.second << ", lost " << testing::PrintToString(lost) << ": "
+          << agreement.response;
     }
   }
 }
