@@ -114,7 +114,9 @@ int run(const Arguments& a) {
   keep_existing(a.common, to);
   leave_standard_output(a.common, to);
   make_directory(a.common, {"convert.json"});
-  const std::unique_ptr<logs::RecordedLog> log = logs::open_log(from, reader_options(a.common));
+  logs::LogOptions reader = reader_options(a.common);
+  reader.leaps = true;
+  const std::unique_ptr<logs::RecordedLog> log = logs::open_log(from, reader);
   const logs::LogReport& report = log->report();
   logs::LogWriteOptions options;
   options.compression = a.compression;

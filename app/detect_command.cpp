@@ -149,6 +149,7 @@ int run(const Arguments& a) {
   }
   Detector detector = make_detector(model, a.detector);
   logs::LogOptions reader = reader_options(a.common);
+  reader.leaps = true;  // of a sensor that fails
   reader.only = robots::useful_columns(model.robot);
   reader.heading_offset = model.robot.heading_offset;
   reader.clock = model.robot.clock;

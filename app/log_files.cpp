@@ -11,6 +11,7 @@ namespace wheelwright::app {
 
 logs::LogOptions reader_options(const CommonOptions& options) {
   logs::LogOptions reader;
+  reader.leaps = false;
   reader.msg_path = options.msg_path;
   reader.trust = options.trust;
   reader.map = options.columns;

@@ -226,6 +226,7 @@ std::unique_ptr<LogObject> read_recorded(const Paths& paths, const RobotObject* 
   }
   options.msg_path = msg_path;
   options.trust = trust;
+  options.leaps = false;
   const auto files = std::holds_alternative<Path>(paths) ? std::vector<Path>{std::get<Path>(paths)}
                                                          : std::get<std::vector<Path>>(paths);
   const py::gil_scoped_release unlocked;

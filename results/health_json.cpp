@@ -43,6 +43,8 @@ doctor::ReaderCounts reader_counts(const logs::LogReport& report) {
           .incomplete = report.empty.count + report.not_finite.count,
           .duplicates = report.duplicates.count,
           .truncated = report.truncated.count,
+          .leaps = report.leaps.count,
+          .first_leap = report.leaps.first,
           .jumps = report.jumps.count,
           .unwrapped = report.angle_wraps.count,
           .contradictions = std::move(contradictions),

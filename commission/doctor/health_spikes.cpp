@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,47 +7,19 @@
 #include <fmt/format.h>
 
 #include "commission/doctor/log_health.hpp"
-#include "core/statistics.hpp"
+#include "core/leaps.hpp"
 
 namespace wheelwright::doctor {
 namespace {
 
-constexpr double kTimesTheirUsual = 10.0;  // the 99 % quantile of changes from row to row
-constexpr double kSpeedShare = 0.5;        // of the size of speeds and rates (99.9 % quantile), there and back
-constexpr double kEffortShare = 3.0;       // of that of efforts, which a controller may well jerk
-constexpr double kBackAgain = 0.5;         // of the jump, by which the row after may differ from the row before
-constexpr std::size_t kLongestSpike = 2;   // rows
-
-// Rows of `column` that lie far off those before and after.
-std::vector<bool> spikes_of(const HealthView& view, const std::vector<double>& column, double share) {
-  std::vector<double> changes, sizes;
-  for (const auto& [first, last] : view.segments) {
-    for (std::size_t k = first; k < last; ++k) {
-      sizes.push_back(std::abs(column[k]));
-      if (k > first) {
-        changes.push_back(std::abs(column[k] - column[k - 1]));
-      }
-    }
-  }
-  const double least =
-      std::max(kTimesTheirUsual * quantile(std::move(changes), 0.99), share * quantile(std::move(sizes), 0.999));
-  std::vector<bool> flagged(column.size(), false);
-  if (!(least > 0.0)) {
-    return flagged;
-  }
-  for (const auto& [first, last] : view.segments) {
-    for (std::size_t k = first + 1; k + 1 < last; ++k) {
-      for (std::size_t rows = 1; rows <= kLongestSpike && k + rows < last; ++rows) {
-        const double there = column[k] - column[k - 1], back = column[k + rows - 1] - column[k + rows];
-        if (there * back > 0.0 && std::min(std::abs(there), std::abs(back)) > least &&
-            std::abs(column[k + rows] - column[k - 1]) < kBackAgain * std::min(std::abs(there), std::abs(back))) {
-          std::fill_n(flagged.begin() + static_cast<std::ptrdiff_t>(k), rows, true);
-          break;
-        }
-      }
-    }
-  }
-  return flagged;
+LogFinding leaping(std::size_t rows, std::string sentence, std::string next) {
+  return {.id = "signals.spikes",
+          .topic = FindingTopic::signals,
+          .severity = FindingSeverity::warning,
+          .sentence = std::move(sentence),
+          .next = std::move(next),
+          .value = static_cast<double>(rows),
+          .unit = "rows"};
 }
 
 void tell_spikes(const HealthView& view, const std::string& name, const std::vector<double>* column, double share,
@@ -56,34 +27,41 @@ void tell_spikes(const HealthView& view, const std::string& name, const std::vec
   if (column == nullptr) {
     return;
   }
-  const std::vector<bool> flagged = spikes_of(view, *column, share);
-  const auto rows = std::ranges::count(flagged, true);
+  const std::vector<bool> flagged =
+      core::leaps_in(*column, view.segments, core::least_leap(*column, view.segments, share));
+  const auto rows = static_cast<std::size_t>(std::ranges::count(flagged, true));
   if (rows == 0) {
     return;
   }
   const auto first = static_cast<std::size_t>(std::ranges::find(flagged, true) - flagged.begin());
-  LogFinding f{.id = "signals.spikes",
-               .topic = FindingTopic::signals,
-               .severity = FindingSeverity::warning,
-               .next = "Leave these rows out of the log: a value that is not meant makes bounds wide, or wrong.",
-               .columns = {name},
-               .value = static_cast<double>(rows),
-               .unit = "rows"};
-  f.sentence = fmt::format("{} leaps away and back in {} row{}, first to {:.4g} from {:.4g}: as nothing that moves.",
-                           name, rows, rows == 1 ? "" : "s", (*column)[first], (*column)[first - 1]);
+  LogFinding f =
+      leaping(rows,
+              fmt::format("{} leaps away and back in {} row{}, first to {:.4g} from {:.4g}: as nothing that moves.",
+                          name, rows, rows == 1 ? "" : "s", (*column)[first], (*column)[first - 1]),
+              "Leave these rows out of the log: a value that is not meant makes bounds wide, or wrong.");
+  f.columns = {name};
   set_stretches(f, view, flagged, 1.5 * view.step);
   findings.push_back(std::move(f));
 }
 
 }  // namespace
 
-void check_spikes(const HealthView& view, std::vector<LogFinding>& findings) {
-  for (const JointView& joint : view.joints) {
-    tell_spikes(view, joint.angle_name, joint.angle, 0.0, findings);
-    tell_spikes(view, joint.speed_name, joint.speed, kSpeedShare, findings);
-    tell_spikes(view, joint.effort_name, joint.effort, kEffortShare, findings);
+void check_spikes(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings) {
+  if (reader.leaps > 0) {
+    findings.push_back(leaping(
+        reader.leaps,
+        fmt::format("{} of {} rows were left out, in which a speed, rate or angle leaps away and back as nothing that "
+                    "moves: the first at {}.",
+                    reader.leaps, reader.rows_read, reader.first_leap),
+        "No command but `detect` reads them: they are bridged as lost rows are. Look for what disturbs the sensor or "
+        "its bus."));
   }
-  tell_spikes(view, "gyro_z", view.column("gyro_z"), 1.0, findings);
+  for (const JointView& joint : view.joints) {
+    tell_spikes(view, joint.angle_name, joint.angle, core::kAngleLeap, findings);
+    tell_spikes(view, joint.speed_name, joint.speed, core::kSpeedLeap, findings);
+    tell_spikes(view, joint.effort_name, joint.effort, core::kEffortLeap, findings);
+  }
+  tell_spikes(view, "gyro_z", view.column("gyro_z"), core::kRateLeap, findings);
 }
 
 }  // namespace wheelwright::doctor

@@ -519,7 +519,7 @@ LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, co
         [&] {
           check_signals(view, reader, health.findings);
           check_rounding(view, health.findings);
-          check_spikes(view, health.findings);
+          check_spikes(view, reader, health.findings);
           check_odometry(view, health.findings);
           check_gyro_delay(view, health.findings);
           check_sources(view, health.findings);

@@ -83,6 +83,8 @@ struct ReaderCounts {
   std::size_t incomplete = 0;                    ///< rows dropped: a field that is needed is empty or not finite
   std::size_t duplicates = 0;                    ///< rows dropped: the time of the row before
   std::size_t truncated = 0;                     ///< last lines cut off
+  std::size_t leaps = 0;                         ///< rows left out: a value leaps away and back as nothing that moves
+  std::string first_leap = {};                   ///< where the first of them is
   std::size_t jumps = 0;                         ///< segments that begin where a wheel angle jumps as no wheel turns
   std::size_t unwrapped = 0;                     ///< jumps of a wheel angle by a turn that were undone
   std::vector<std::string> contradictions = {};  ///< why the joints are those of no differential drive, in sentences
@@ -183,8 +185,8 @@ void check_gyro_delay(const HealthView& view, std::vector<LogFinding>& findings)
 bool check_direction(const HealthView& view, std::vector<LogFinding>& findings);
 /// Speeds in whole multiples of a unit that no encoder makes, rounded or cut off.
 void check_rounding(const HealthView& view, std::vector<LogFinding>& findings);
-/// Single rows, or two, in which a column leaps away and back.
-void check_spikes(const HealthView& view, std::vector<LogFinding>& findings);
+/// Up to three rows in which a column leaps away and back: those that the reader left out, and those that are there.
+void check_spikes(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings);
 /// Efforts that are early because speeds passed through a low-pass filter, in this setting with its fit. Returns
 /// whether that, or that it cannot be told from a delay, was said.
 bool check_smoothing(const HealthView& view, const commission::Setting& setting, const commission::Fit& fit,

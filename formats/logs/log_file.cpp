@@ -116,7 +116,8 @@ std::unique_ptr<RecordedLog> open_log(const std::vector<std::filesystem::path>& 
   }
   auto log = std::make_unique<RowLog>(std::move(files), RowLogOptions{.block_rows = options.block_rows,
                                                                       .min_rows = options.min_rows,
-                                                                      .heading_offset = options.heading_offset});
+                                                                      .heading_offset = options.heading_offset,
+                                                                      .leaps = options.leaps});
   for (std::size_t k = 0; k < paths.size(); ++k) {
     if (state_of(paths[k]) != states[k]) {
       throw InputError(paths[k].string() + ": was written to while it was read: expected a log that is complete");

@@ -91,7 +91,7 @@ struct LogReport {
   std::vector<LogFileReport> files;
   std::size_t rows = 0;       ///< rows handed on
   std::size_t rows_read = 0;  ///< rows met; rows_read − rows = empty + not_finite + uncovered + duplicates +
-                              ///< truncated
+                              ///< truncated + leaps
   std::size_t segments = 0;
   double seconds = 0.0;      ///< sum of the files' seconds, s
   double median_step = 0.0;  ///< median of at most the first 100 001 time steps > 0, s
@@ -99,6 +99,7 @@ struct LogReport {
   Occurrences not_finite;    ///< rows dropped: a used field is NaN or infinite
   Occurrences uncovered;     ///< rows dropped: another topic has no samples around their time
   Occurrences duplicates;    ///< rows dropped: the same time as the row before
+  Occurrences leaps;         ///< rows left out: a speed, rate or angle leaps as nothing that moves (core::least_leap)
   Occurrences truncated;     ///< last lines dropped that are cut off in the middle (at most one a file)
   Occurrences resets;        ///< segments begun because time went backwards
   Occurrences gaps;          ///< segments begun because a step is more than 5 × the median step

@@ -2,6 +2,7 @@
 #include "formats/logs/row_log.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -12,6 +13,7 @@
 
 #include "core/check.hpp"
 #include "core/error.hpp"
+#include "core/leaps.hpp"
 #include "core/limits.hpp"
 #include "core/statistics.hpp"
 #include "formats/logs/recorded_log.hpp"
@@ -222,7 +224,7 @@ std::string RowCleaner::expectation(std::size_t index) const {
 
 namespace {
 
-constexpr std::size_t steps_for_median = 100001;
+constexpr std::size_t steps_ahead = 100001;
 
 /// The rows of a log that are in memory.
 class KeptRows final : public LogSource {
@@ -256,6 +258,116 @@ class KeptRows final : public LogSource {
   std::size_t position_ = 0;
 };
 
+/// The share for core::least_leap() of a column that no effort makes leap.
+std::optional<double> leap_share(std::string_view name) {
+  return name == "omega_r" || name == "omega_l" || name == "velocity" ? std::optional(core::kSpeedLeap)
+         : name == "phi_r" || name == "phi_l" || name == "position"   ? std::optional(core::kAngleLeap)
+         : name == "gyro_z"                                           ? std::optional(core::kRateLeap)
+                                                                      : std::nullopt;
+}
+
+/// A walk without the rows of another in which a column leaps by more than its own of `least`.
+class WithoutLeaps final : public RowWalk {
+ public:
+  WithoutLeaps(std::unique_ptr<RowWalk> walk, std::string path, const std::vector<std::string>& names,
+               const std::vector<double>& least, double longest_step, LogReport* report)
+      : walk_(std::move(walk)),
+        path_(std::move(path)),
+        names_(names),
+        least_(least),
+        longest_step_(longest_step),
+        report_(report) {
+    for (Row& row : rows_) {
+      row.values.resize(names.size());
+    }
+  }
+
+  bool next(RowOutcome& outcome) override {
+    std::rotate(rows_.begin(), rows_.begin() + 1, rows_.end());
+    count_ -= std::min<std::size_t>(count_, 1);
+    do {
+      fill();
+    } while (leave_out());
+    outcome = rows_[0].starts ? RowOutcome::new_segment : RowOutcome::row;
+    return count_ > 0;
+  }
+  [[nodiscard]] double t() const override { return rows_[0].t; }
+  [[nodiscard]] const double* values() const override { return rows_[0].values.data(); }
+  void describe(LogFileReport& file) const override { walk_->describe(file); }
+
+ private:
+  struct Row {
+    double t = 0.0;
+    bool starts = false;
+    std::vector<double> values;
+  };
+
+  void fill() {
+    RowOutcome outcome{};
+    while (!ended_ && count_ < rows_.size()) {
+      ended_ = !walk_->next(outcome);
+      if (!ended_ && outcome != RowOutcome::dropped) {
+        Row& row = rows_[count_++];
+        row.t = walk_->t();
+        row.starts = outcome == RowOutcome::new_segment;
+        std::copy_n(walk_->values(), row.values.size(), row.values.begin());
+      }
+    }
+  }
+
+  /// Takes away the rows behind the first that leap; false where none do.
+  bool leave_out() {
+    std::size_t same = std::min<std::size_t>(count_, 1);  // rows of the segment of the first
+    while (same < count_ && !rows_[same].starts) {
+      ++same;
+    }
+    for (std::size_t c = 0; c < names_.size(); ++c) {
+      if (!std::isfinite(least_[c])) {
+        continue;
+      }
+      std::array<double, core::kLongestLeap + 2> window{};
+      for (std::size_t k = 0; k < same; ++k) {
+        window[k] = rows_[k].values[c];
+      }
+      const std::size_t leap = core::leap_behind(std::span(window).first(same), least_[c]);
+      if (leap > 0) {
+        note(&LogReport::leaps, leap, c);
+        if (report_ != nullptr) {
+          report_->rows -= leap;
+        }
+        const auto first = rows_.begin() + 1, after = first + static_cast<std::ptrdiff_t>(leap);
+        std::rotate(first, after, rows_.end());
+        count_ -= leap;
+        if (rows_[1].t - rows_[0].t > longest_step_) {
+          rows_[1].starts = true;
+          note(&LogReport::gaps, 1, c);
+        }
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void note(Occurrences LogReport::*what, std::size_t times, std::size_t column) {
+    if (report_ != nullptr) {
+      Occurrences& met = report_->*what;
+      met.first =
+          met.count > 0 ? met.first : fmt::format("{}, t = {:.6g} s, column {}", path_, rows_[1].t, names_[column]);
+      met.count += times;
+    }
+  }
+
+  std::unique_ptr<RowWalk> walk_;
+  std::string path_;
+  const std::vector<std::string>& names_;
+  const std::vector<double>& least_;
+  double longest_step_;
+  LogReport* report_;
+  std::array<Row, core::kLongestLeap + 2> rows_;  ///< the current one and those behind it
+  std::size_t count_ = 0;                         ///< of them
+  bool ended_ = false;
+};
+
 }  // namespace
 
 double middle_of(std::vector<double>& steps) {
@@ -277,7 +389,7 @@ RowLog::RowLog(std::vector<std::unique_ptr<RowFile>> files, RowLogOptions option
     }
   }
   theta_ = static_cast<std::size_t>(std::ranges::find(names_, "theta") - names_.begin());
-  find_median_step();
+  look_ahead();
   kept_ = std::make_shared<std::vector<LogBlock>>();
   survey();
   judge();
@@ -285,24 +397,47 @@ RowLog::RowLog(std::vector<std::unique_ptr<RowFile>> files, RowLogOptions option
 }
 
 std::unique_ptr<RowWalk> RowLog::open(std::size_t file, LogReport* report) {
-  return files_[file]->open(names_, longest_step(), report);
+  auto walk = files_[file]->open(names_, longest_step(), report);
+  if (least_leaps_.empty()) {
+    return walk;
+  }
+  return std::make_unique<WithoutLeaps>(std::move(walk), files_[file]->path(), names_, least_leaps_, longest_step(),
+                                        report);
 }
 
-/// Median over the first steps > 0, from a reading that counts nothing.
-void RowLog::find_median_step() {
+/// Median of the steps > 0 and the smallest leaps of the first rows, from a reading that counts nothing.
+void RowLog::look_ahead() {
   std::vector<double> steps;
-  for (std::size_t k = 0; k < files_.size() && steps.size() < steps_for_median; ++k) {
+  std::vector<core::RowRange> segments;
+  std::vector<std::vector<double>> values(options_.leaps ? 0 : names_.size());
+  std::size_t rows = 0;
+  for (std::size_t k = 0; k < files_.size() && steps.size() < steps_ahead; ++k) {
     const auto walk = open(k, nullptr);
     RowOutcome outcome{};
     double before = 0.0;
-    while (steps.size() < steps_for_median && walk->next(outcome)) {
+    while (steps.size() < steps_ahead && walk->next(outcome)) {
+      if (outcome == RowOutcome::dropped) {
+        continue;
+      }
       if (outcome == RowOutcome::row) {
         steps.push_back(walk->t() - before);
+      } else {
+        segments.emplace_back(rows, rows);
       }
       before = walk->t();
+      segments.back().second = ++rows;
+      for (std::size_t c = 0; c < values.size(); ++c) {
+        values[c].push_back(walk->values()[c]);
+      }
     }
   }
   report_.median_step = middle_of(steps);
+  std::vector<double> least;
+  for (std::size_t c = 0; c < values.size(); ++c) {
+    const auto share = leap_share(names_[c]);
+    least.push_back(share ? core::least_leap(values[c], segments, *share) : std::numeric_limits<double>::infinity());
+  }
+  least_leaps_ = std::move(least);
 }
 
 void RowLog::survey() {

@@ -160,6 +160,9 @@ struct RowLogOptions {
   /// Rows are kept in memory where they need no more than this; those of a longer log are read anew by every walk.
   std::size_t kept_bytes = std::size_t{1} << 28;
   double heading_offset = 0.0;  ///< rad, added to `theta`
+  /// Whether rows are handed on in which a speed, rate or angle leaps by more than core::least_leap() of the first
+  /// 100 001 rows; else they are left out and counted.
+  bool leaps = true;
 };
 
 /// A log over files, each of which begins a new segment. Memory does not grow with them beyond
@@ -181,7 +184,7 @@ class RowLog : public RecordedLog {
 
  private:
   [[nodiscard]] std::unique_ptr<RowWalk> open(std::size_t file, LogReport* report);
-  void find_median_step();
+  void look_ahead();
   void survey();
   void keep(const RowWalk& walk, bool starts);
   [[nodiscard]] double value(const RowWalk& walk, std::size_t column) const;
@@ -192,6 +195,7 @@ class RowLog : public RecordedLog {
   std::vector<std::string> names_;
   std::size_t theta_ = 0;  ///< index of the heading, the number of names where there is none
   RowLogOptions options_;
+  std::vector<double> least_leaps_;  ///< by column; empty where no row is left out
   LogReport report_;
   std::size_t file_ = 0;
   std::unique_ptr<RowWalk> walk_;

@@ -20,6 +20,7 @@
 #include "formats/logs/ros_messages.hpp"
 #include "formats/logs/row_log.hpp"
 
+#include <fmt/format.h>
 #include <hdf5.h>
 
 #include "tests/support/scratch.hpp"
@@ -809,6 +810,45 @@ TEST_F(LogFile, PiecesOfHdf5ThatWereNeverWrittenAreRefused) {
   content.replace(key + 8, 8, 8, '\0');
   const auto file = put("damaged.h5", content);
   EXPECT_THAT(input_error([&] { read({file}); }), HasSubstr("were never written or are lost"));
+}
+
+// Of speeds that leap in a row or two at known places: what is left are all other rows, as they were, in any blocks.
+TEST_F(LogFile, RowsThatLeapAreLeftOutAndCountedOnRequest) {
+  std::string text = "t,omega_r,omega_l,tau_r,tau_l\n";
+  const std::vector<int> leaps = {40, 41, 90, 150, 300, 302, 398};
+  for (int k = 0; k < 400; ++k) {
+    const bool leap = std::ranges::find(leaps, k) != leaps.end();
+    const double t = 0.01 * k + (k < 200 ? 0.0 : 5.0), speed = 5.0 * std::sin(t);
+    text += fmt::format("{:.2f},{},{},{},1\n", t, leap && k % 2 == 0 ? 400.0 : speed,
+                        leap && k % 2 == 1 ? -90.0 : speed, k == 60 ? 99.0 : 1.0);
+  }
+  const auto file = put("leaps.csv", text);
+  const LogTable as_logged = read_all(*open_log({file}));
+  ASSERT_EQ(as_logged.rows(), 400U);
+  for (const std::size_t block_rows : {7U, 4096U}) {
+    LogOptions options;
+    options.leaps = false;
+    options.block_rows = block_rows;
+    const auto log = open_log({file}, options);
+    const LogTable left = read_all(*log);
+    std::size_t row = 0;
+    for (std::size_t k = 0; k < 400; ++k) {
+      if (std::ranges::find(leaps, static_cast<int>(k)) != leaps.end()) {
+        continue;
+      }
+      ASSERT_LT(row, left.rows());
+      EXPECT_EQ(left.t[row], as_logged.t[k]);
+      EXPECT_EQ(left.columns[0][row], as_logged.columns[0][k]);
+      EXPECT_EQ(left.columns[2][row], as_logged.columns[2][k]);  // efforts may leap
+      ++row;
+    }
+    EXPECT_EQ(left.rows(), row);
+    EXPECT_EQ(left.segment_starts, (std::vector<std::size_t>{0, 196}));
+    EXPECT_EQ(log->report().leaps.count, leaps.size());
+    EXPECT_EQ(log->report().rows, row);
+    EXPECT_EQ(log->report().rows_read, 400U);
+    EXPECT_THAT(log->report().leaps.first, AllOf(HasSubstr("leaps.csv"), HasSubstr("t = 0.4 s, column omega_r")));
+  }
 }
 
 }  // namespace
