@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/check.hpp"
+#include "core/statistics.hpp"
 
 namespace wheelwright::core {
 namespace {
@@ -41,7 +42,9 @@ void EvenTimes::begin(double stamp) {
 void EvenTimes::put(double stamp, double index, bool starts) {
   const double off = place_of(stamp) - index;
   ++seen_;
-  phase_ += std::clamp(off, -0.5, 0.5) / static_cast<double>(std::min(seen_, kMemory));
+  if (std::abs(off) <= kSure) {  // of rows that came together the others tell when they were sent
+    phase_ += off / static_cast<double>(std::min(seen_, kMemory));
+  }
   index_ = index;
   last_ = anchor_ + index * clock_.step;
   places_.push_back({.t = last_, .starts = starts, .off = off});
@@ -175,6 +178,15 @@ bool EvenSource::next(LogBlock& block) {
 std::unique_ptr<LogSource> EvenSource::another_walk() const {
   std::shared_ptr<LogSource> walk = log_->another_walk();
   return walk ? std::make_unique<EvenSource>(std::move(walk), clock_) : nullptr;
+}
+
+double step_of_bursts(const std::vector<double>& t) {
+  constexpr std::size_t kSpan = 30, kFewest = 200;
+  std::vector<double> spans;
+  for (std::size_t k = 0; t.size() >= kFewest && k + kSpan < t.size(); ++k) {
+    spans.push_back((t[k + kSpan] - t[k]) / static_cast<double>(kSpan));
+  }
+  return spans.empty() ? 0.0 : median(std::move(spans));
 }
 
 LogTable read_evenly(const LogTable& table, const EvenClock& clock) {

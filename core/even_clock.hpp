@@ -80,6 +80,10 @@ class EvenSource final : public LogSource {
   bool ended_ = false;
 };
 
+/// The mean step of times `t` whatever bursts they come in, s: the median over stretches of 30 rows; 0 for fewer than
+/// 200.
+[[nodiscard]] double step_of_bursts(const std::vector<double>& t);
+
 /// `table` with its times by `clock`. Throws as EvenTimes.
 [[nodiscard]] LogTable read_evenly(const LogTable& table, const EvenClock& clock);
 

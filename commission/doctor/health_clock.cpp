@@ -231,69 +231,96 @@ bool moves_evenly(const HealthView& view, double close) {
   return true;
 }
 
-// Rows that are sent together have no times of their own.
-void check_bursts(const HealthView& view, std::vector<LogFinding>& out) {
-  constexpr std::size_t kSpan = 30;
-  std::vector<double> steps, spans;
+// Rows that are sent together have no times of their own: what is said of them.
+std::optional<LogFinding> find_bursts(const HealthView& view) {
   const std::vector<double>& t = view.log->t;
-  for (std::size_t k = 0; k + kSpan < t.size(); ++k) {
-    steps.push_back(t[k + 1] - t[k]);
-    spans.push_back((t[k + kSpan] - t[k]) / static_cast<double>(kSpan));
+  const double mean = core::step_of_bursts(t);
+  std::size_t close = 0;
+  for (std::size_t k = 1; k < t.size(); ++k) {
+    close += t[k] >= t[k - 1] && t[k] - t[k - 1] < kBurstTogether * mean ? 1 : 0;
   }
-  if (steps.size() < kClockRows) {
-    return;
-  }
-  const double mean = core::median(std::move(spans));
-  const auto close = static_cast<double>(
-      std::ranges::count_if(steps, [&](double step) { return step >= 0.0 && step < kBurstTogether * mean; }));
-  const double share = close / static_cast<double>(steps.size());
+  const double share = static_cast<double>(close) / static_cast<double>(std::max<std::size_t>(t.size(), 2) - 1);
   if (!(mean > 0.0) || share < 0.4 || !moves_evenly(view, kBurstTogether * mean)) {
-    return;
+    return std::nullopt;
   }
-  out.push_back({.id = "time.bursts",
-                 .topic = FindingTopic::time,
-                 .severity = FindingSeverity::fatal,
-                 .sentence = fmt::format("Rows come in bursts of about {:.3g}: {:.0f} % of them follow the row before "
-                                         "within {:.0f} % of the mean step of {:.4g} s. The stamps are those of "
-                                         "arrival; when the samples were taken they do not say.",
-                                         1.0 / (1.0 - share), 100.0 * share, 100.0 * kBurstTogether, mean),
-                 .next = fmt::format("Stamp samples where they are taken (header.stamp set by the driver), or, where "
-                                     "the sensor samples evenly and no row is lost, number them: t = row × {:.6g}.",
-                                     mean),
-                 .columns = {"t"},
-                 .value = share,
-                 .unit = "1",
-                 .refuses = true});
+  return LogFinding{.id = "time.bursts",
+                    .topic = FindingTopic::time,
+                    .severity = FindingSeverity::fatal,
+                    .sentence = fmt::format("Rows come in bursts of about {:.3g}: {:.0f} % of them follow the row "
+                                            "before within {:.0f} % of the mean step of {:.4g} s. The stamps are those "
+                                            "of arrival; when the samples were taken they do not say.",
+                                            1.0 / (1.0 - share), 100.0 * share, 100.0 * kBurstTogether, mean),
+                    .next = fmt::format("Stamp samples where they are taken (header.stamp set by the driver), or, "
+                                        "where the sensor samples evenly and no row is lost, number them: t = row × "
+                                        "{:.6g}.",
+                                        mean),
+                    .columns = {"t"},
+                    .value = share,
+                    .unit = "1",
+                    .refuses = true};
+}
+
+// The step by which the rows that begin bursts are numbered, where no row is lost.
+double step_between_bursts(const HealthView& view) {
+  const std::vector<double>& t = view.log->t;
+  const double close = kBurstTogether * core::step_of_bursts(t);
+  double rows = 0.0, seconds = 0.0;
+  for (const auto& [first, last] : view.segments) {
+    double n = 0.0, row = 0.0, time = 0.0;
+    const auto visit = [&](auto&& take) {
+      for (std::size_t k = first + 1; k < last; ++k) {
+        if (t[k] - t[k - 1] >= close) {
+          take(static_cast<double>(k - first), t[k] - t[first]);
+        }
+      }
+    };
+    visit([&](double k, double at) {
+      n += 1.0;
+      row += k;
+      time += at;
+    });
+    visit([&](double k, double at) {
+      rows += (k - row / n) * (k - row / n);
+      seconds += (k - row / n) * (at - time / n);
+    });
+  }
+  return rows > 0.0 ? seconds / rows : 0.0;
 }
 
 }  // namespace
 
 std::optional<EvenClock> check_clock(const HealthView& view, std::vector<LogFinding>& findings) {
-  check_bursts(view, findings);
-  if (view.robot.clock || view.log->rows() < kClockRows || !(view.step > 0.0) || !view.has_motion() ||
-      !findings.empty()) {
+  std::optional<LogFinding> bursts = find_bursts(view);
+  const auto by_stamps = [&]() -> std::optional<EvenClock> {
+    if (bursts) {
+      findings.push_back(std::move(*bursts));
+    }
     return std::nullopt;
+  };
+  const double step = bursts ? step_between_bursts(view) : even_step(view);
+  if (view.robot.clock || view.log->rows() < kClockRows || !(step > 0.0) || !view.has_motion()) {
+    return by_stamps();
   }
-  ClockGrid grid = place_rows(view, even_step(view));
-  for (int pass = 0; pass < 2; ++pass) {
+  ClockGrid grid = place_rows(view, step);
+  for (int pass = bursts ? 2 : 0; pass < 2; ++pass) {  // what begins bursts tells more than all stamps do
     grid = place_rows(view, refined_step(view, grid));
   }
   const double scatter = stamp_scatter(grid);
   if (static_cast<double>(grid.unplaced) > kClockUnplaced * static_cast<double>(grid.t.size()) ||
       !(scatter > kClockScatters)) {
-    return std::nullopt;
+    return by_stamps();
   }
   const EvenClock clock{.step = grid.step, .drift = drift_of(view, grid)};
   const MovedShare moved = moved_share(view, grid);
   const bool told = moved.error < kClockTold;
   const bool even = told && 1.0 - moved.share > kClockSure * moved.error &&
                     std::abs(moved.share) < std::max(kClockMoved, 3.0 * moved.error);
-  if (!even && (told || scatter < kClockScattersMuch)) {
-    return std::nullopt;
+  if (!even && (bursts || told || scatter < kClockScattersMuch)) {
+    return by_stamps();
   }
-  const std::string scatters =
-      fmt::format("Stamps scatter by {:.2g} s ({:.2g} % of a step) about an even clock of {:.6g} s",
-                  scatter * clock.step, 100.0 * scatter, clock.step);
+  const std::string scatters = fmt::format(
+      "{} scatter by {:.2g} s ({:.2g} % of a step) about an even clock of {:.6g} s",
+      bursts ? "Stamps of rows that come in bursts" : "Stamps", scatter * clock.step, 100.0 * scatter, clock.step);
   LogFinding finding{.id = "time.even_clock",
                      .topic = FindingTopic::time,
                      .severity = FindingSeverity::notice,

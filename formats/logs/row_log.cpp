@@ -13,6 +13,7 @@
 
 #include "core/check.hpp"
 #include "core/error.hpp"
+#include "core/even_clock.hpp"
 #include "core/leaps.hpp"
 #include "core/limits.hpp"
 #include "core/statistics.hpp"
@@ -225,6 +226,7 @@ std::string RowCleaner::expectation(std::size_t index) const {
 namespace {
 
 constexpr std::size_t steps_ahead = 100001;
+constexpr double burst_factor = 3.0;  // median steps that the mean step of bursts is more than
 
 /// The rows of a log that are in memory.
 class KeptRows final : public LogSource {
@@ -407,7 +409,7 @@ std::unique_ptr<RowWalk> RowLog::open(std::size_t file, LogReport* report) {
 
 /// Median of the steps > 0 and the smallest leaps of the first rows, from a reading that counts nothing.
 void RowLog::look_ahead() {
-  std::vector<double> steps;
+  std::vector<double> times, steps;
   std::vector<core::RowRange> segments;
   std::vector<std::vector<double>> values(options_.leaps ? 0 : names_.size());
   std::size_t rows = 0;
@@ -424,14 +426,17 @@ void RowLog::look_ahead() {
       } else {
         segments.emplace_back(rows, rows);
       }
-      before = walk->t();
+      times.push_back(before = walk->t());
       segments.back().second = ++rows;
       for (std::size_t c = 0; c < values.size(); ++c) {
         values[c].push_back(walk->values()[c]);
       }
     }
   }
-  report_.median_step = middle_of(steps);
+  report_.median_step = usual_step_ = middle_of(steps);
+  if (const double mean = core::step_of_bursts(times); mean > burst_factor * usual_step_) {
+    usual_step_ = mean;
+  }
   std::vector<double> least;
   for (std::size_t c = 0; c < values.size(); ++c) {
     const auto share = leap_share(names_[c]);
@@ -518,7 +523,7 @@ void RowLog::judge() const {
 }
 
 double RowLog::longest_step() const {
-  return report_.median_step > 0.0 ? gap_factor * report_.median_step : std::numeric_limits<double>::infinity();
+  return usual_step_ > 0.0 ? gap_factor * usual_step_ : std::numeric_limits<double>::infinity();
 }
 
 std::unique_ptr<LogSource> RowLog::another_walk() const {

@@ -196,6 +196,7 @@ class RowLog : public RecordedLog {
   std::size_t theta_ = 0;  ///< index of the heading, the number of names where there is none
   RowLogOptions options_;
   std::vector<double> least_leaps_;  ///< by column; empty where no row is left out
+  double usual_step_ = 0.0;          ///< s, of which a gap is many: the median, or of bursts the mean over many rows
   LogReport report_;
   std::size_t file_ = 0;
   std::unique_ptr<RowWalk> walk_;

@@ -61,6 +61,32 @@ Outcome follow(const Stamped& log, double step) {
   return outcome;
 }
 
+// Only the last rows, behind which no burst comes, may be left without a place.
+TEST(EvenTimes, RowsThatWereSentTogetherKeepTheirDistance) {
+  for (const double step : {0.1, 0.0025}) {
+    for (const std::size_t burst : {2U, 3U, 5U, 8U}) {
+      for (const double off : {0.0, 1e-4}) {  // of the clock's step
+        std::mt19937_64 rng(1);
+        const Stamped log =
+            stamped(1000, step, 0.0, rng, [&](std::size_t k) { return static_cast<double>(burst - 1 - k % burst); });
+        EvenTimes times({.step = step * (1.0 + off), .drift = off});
+        for (std::size_t k = 0; k < log.stamp.size(); ++k) {
+          times.take(log.stamp[k], k == 0);
+        }
+        times.finish();
+        double before = 0.0;
+        for (std::size_t k = 0; const auto place = times.next(); ++k) {
+          EXPECT_TRUE(!place->starts || k == 0 || k > log.stamp.size() - burst) << burst << ", row " << k;
+          if (!place->starts) {
+            EXPECT_NEAR((place->t - before) / step, 1.0, 2.0 * off + 1e-9);
+          }
+          before = place->t;
+        }
+      }
+    }
+  }
+}
+
 TEST(EvenTimes, RowsKeepTheirDistanceWhateverTheScatter) {
   for (const double step : {0.1, 0.02, 0.01, 0.002}) {
     for (const double size : {0.001, 0.01, 0.05, 0.1}) {  // of a step, standard deviation

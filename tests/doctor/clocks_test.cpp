@@ -150,12 +150,31 @@ TEST(Clocks, WhatARobotFileSaysOfTheClockStands) {
   EXPECT_TRUE(check_clock(make_view(log, a_robot()), findings));
 }
 
-TEST(Clocks, RowsThatComeInBurstsAreRefused) {
-  for (const std::size_t burst : {2, 3, 5, 10}) {
+TEST(Clocks, RowsThatComeInBurstsAreReadEvenlyWhereTheMotionShowsThatTheyAre) {
+  for (const std::size_t burst : {2, 3, 5}) {
+    for (const double step : {0.1, 0.02, 0.0025}) {
+      for (const bool uneven : {false, true}) {
+        std::vector<LogFinding> findings;
+        const LogTable log =
+            a_log({.step = step, .counts = 32768, .really_uneven = uneven},
+                  [&](std::size_t k, std::mt19937_64&) { return static_cast<double>(burst - 1 - k % burst); });
+        const auto clock = clock_of(log, findings);
+        ASSERT_EQ(clock.has_value(), !uneven) << burst << ", " << step;
+        if (clock) {
+          EXPECT_LE(std::abs(step / clock->step - 1.0), clock->drift);
+          EXPECT_EQ(findings.front().id, "time.even_clock");
+        }
+      }
+    }
+  }
+}
+
+TEST(Clocks, RowsThatComeInBurstsAreRefusedWhereSomeAreLost) {
+  for (const std::size_t burst : {2, 3, 5}) {
     std::vector<LogFinding> findings;
-    const LogTable log =
-        a_log({}, [&](std::size_t k, std::mt19937_64&) { return static_cast<double>(burst - 1 - k % burst); });
-    EXPECT_FALSE(clock_of(log, findings));
+    const LogTable log = a_log(
+        {.lost = 0.02}, [&](std::size_t k, std::mt19937_64&) { return static_cast<double>(burst - 1 - k % burst); });
+    EXPECT_FALSE(clock_of(log, findings)) << burst;
     ASSERT_EQ(findings.size(), 1U) << burst;
     EXPECT_EQ(findings.front().id, "time.bursts");
     EXPECT_TRUE(findings.front().is_refusal());

@@ -851,5 +851,18 @@ TEST_F(LogFile, RowsThatLeapAreLeftOutAndCountedOnRequest) {
   }
 }
 
+// Bursts of rows are no gaps, wherever the row of a burst comes.
+TEST_F(LogFile, BurstsOfRowsAreOneSegment) {
+  for (const int burst : {3, 5}) {
+    std::string text = "t,omega_r,omega_l\n";
+    for (int k = 0; k < 400; ++k) {
+      text += fmt::format("{:.6f},1,1\n", 0.1 * (k / burst * burst + burst) + 0.001 * (k % burst));
+    }
+    const auto log = open_log({put("bursts.csv", text)});
+    EXPECT_EQ(log->report().segments, 1U) << burst;
+    EXPECT_EQ(log->report().rows, 400U);
+  }
+}
+
 }  // namespace
 }  // namespace wheelwright::logs::log_file_test
