@@ -32,6 +32,7 @@ constexpr double kOfInterpolation = 1.25;  // second differences of samples are 
 constexpr double kLongestPoseStep = 0.25;  // s
 constexpr double kBendSpan = 0.05;         // s
 constexpr double kClose = 1e-5;            // rad: no sensor of its own would be as close to wheels on a floor
+constexpr double kOwnBends = 0.005;        // share of the rows
 constexpr double kWholeTurn = 2.0 * std::numbers::pi;
 
 // The coarsest decimal unit of which all values are multiples, as they are or wrapped into a turn; 0 where there is
@@ -183,6 +184,27 @@ bool rougher_than_counts(const std::vector<Kept>& segments, const Eigen::Vector2
   return heading > kOfTheRounding * wheels;
 }
 
+// Whether the heading bends more than lines between samples of what the wheels do near by, `between` rows apart, and
+// `counts` (rad) can: as noise of its own does, at rest above all.
+bool bends_by_itself(const std::vector<Kept>& segments, const Eigen::Vector2d& weights, double between, double counts) {
+  const auto around = static_cast<std::size_t>(std::ceil(between)) + 1;
+  std::size_t rows = 0, own = 0;
+  for (const Kept& log : segments) {
+    std::vector<double> wheels(log.rows(), 0.0);
+    for (std::size_t k = 1; k + 1 < log.rows(); ++k) {
+      wheels[k] =
+          std::abs(weights[0]) * Kept::bend(log.wheel[0], k) + std::abs(weights[1]) * Kept::bend(log.wheel[1], k);
+    }
+    for (std::size_t k = around + 1; k + around + 1 < log.rows(); ++k) {
+      const auto from = wheels.begin() + static_cast<std::ptrdiff_t>(k - around);
+      const double most = *std::max_element(from, from + static_cast<std::ptrdiff_t>(2 * around + 1));
+      own += Kept::bend(log.heading, k) > (between + 1.0) * most + counts ? 1 : 0;
+      ++rows;
+    }
+  }
+  return own > kFewestPoseWindows && static_cast<double>(own) > kOwnBends * static_cast<double>(rows);
+}
+
 // Of a heading that is within what lines between samples, and counts of the wheels, leave of wheel odometry.
 struct WithinLines {
   double rest = 0.0;     // rad, rms
@@ -245,7 +267,8 @@ std::optional<WithinLines> within_interpolation(const std::vector<Kept>& segment
     // Rounding: 1/12 of a count² at the row, two thirds of that between two samples, at both ends.
     expected += 0.5 * by_lines * by_lines + 5.0 / 18.0 * count * count * c.squaredNorm();
   }
-  if (squares > kOfTheRounding * expected || (by_counts > 0.0 && rougher_than_counts(segments, c, quantum))) {
+  if (squares > kOfTheRounding * expected || (by_counts > 0.0 && rougher_than_counts(segments, c, quantum)) ||
+      bends_by_itself(segments, c, between, 2.0 * (by_counts + quantum))) {
     return std::nullopt;
   }
   return WithinLines{windows.rest().value_or(0.0), close >= kFewestDrives};
