@@ -137,6 +137,15 @@ Assumption assumed_delay(const Commissioning& r) {
   return a;
 }
 
+Assumption assumed_smoothing(const Interval& time) {
+  return {
+      .id = "effort_smoothing",
+      .statement = fmt::format("Efforts passed through a low-pass filter of {:g} to {:g} s, row by row, before they "
+                               "were logged, and the motion did not.",
+                               time.lower, time.upper),
+      .declared_by = "effort.smoothing"};
+}
+
 Assumption assumed_clocks(const Commissioning& r) {
   Assumption a{.id = "clocks",
                .statement = "Stamps are those of the instants of measurement, of motion and effort by one clock.",
@@ -511,6 +520,9 @@ std::vector<Assumption> assumptions_of(const Commissioning& result) {
   const Robot& robot = result.model.robot;
   std::vector<Assumption> list = {assumed_hold(robot), assumed_delay(result), assumed_clocks(result),
                                   assumed_speeds(result.model.measurement)};
+  if (robot.effort_smoothing != Interval{}) {
+    list.push_back(assumed_smoothing(robot.effort_smoothing));
+  }
   if (robot.speed_filter && result.model.measurement.correction.smoothing) {
     list.push_back(assumed_filter(result, *robot.speed_filter));
   }

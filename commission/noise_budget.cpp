@@ -198,9 +198,15 @@ std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Meas
   if (!budget.complete || !effort.bias) {
     return std::nullopt;
   }
+  double gain = 0.0;
+  for (std::size_t j = 0; j < measurement.effort_columns.size(); ++j) {
+    gain = std::max(gain, measurement.effort_gain(j));
+  }
+  // An effort that is sharpened holds the error of the row before, too.
+  const double memory = measurement.smoothing.upper > 0.0 ? measurement.longest_step() : 0.0;
   return classes_with(robot, measurement, budget.sensors.motion,
-                      {budget.sensors.effort, std::min(*effort.bias, budget.sensors.effort), effort.correlation,
-                       effort.deviation.value_or(core::kInfinity)});
+                      {gain * budget.sensors.effort, gain * std::min(*effort.bias, budget.sensors.effort),
+                       effort.correlation + memory, gain * effort.deviation.value_or(core::kInfinity)});
 }
 
 Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& joint_limit) {

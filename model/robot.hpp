@@ -142,7 +142,8 @@ struct Robot {
   Hold hold = Hold::first_order;
   EffortChanges effort_changes = EffortChanges::between;  ///< of a held effort
   Interval effort_delay{0.0, 0.0};        ///< s, holds the constant time by which logged efforts are late (< 0: early)
-  bool effort_delay_found = false;        ///< effort_delay is what a log shows, which nobody declared
+  Interval effort_smoothing{0.0, 0.0};    ///< s, holds T of y += (1 − e^{−h/T})(u − y), as efforts are logged
+  bool effort_delay_found = false;        ///< effort_delay and effort_smoothing are what a log shows, undeclared
   bool effort_unsigned = false;           ///< only |effort| was logged
   std::map<std::string, double> nominal;  ///< physical parameter -> value as designed
   std::map<std::string, Interval> prior;  ///< physical parameter -> bounds known beforehand

@@ -179,6 +179,7 @@ DesignSubject subject_of(const Robot& robot, double step, const FilterDesign& fi
   m.hold = robot.hold;
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
+  m.smoothing = robot.effort_smoothing;
   m.nominal_step = step;
   const model::NoiseBound& angle_noise = !model::on_two_wheels(robot) ? robot.noise.position : robot.noise.wheel_angle;
   const bool angles = subject.filter.order == 2 && robot.speed_source != model::SpeedSource::measured &&

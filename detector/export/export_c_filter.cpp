@@ -118,6 +118,9 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds, bool sums
         "export: the efforts are late by {:g} to {:g} s, which has no C form; expected a model whose effort.delay is 0",
         measurement_.delay.lower, measurement_.delay.upper));
   }
+  if (measurement_.smoothing.upper > 0.0) {
+    throw InputError("export: efforts that are smoothed have no C form; expected a model without effort.smoothing");
+  }
   if (measurement_.clock_drift > 0.0) {
     throw InputError(
         "export: the model is read by an even clock behind scattered stamps, which has no C form; expected a model "

@@ -16,11 +16,13 @@ std::size_t effort_reach(const Measurement& m, const filter::SignalErrors& error
   if (!errors.between_samples) {
     return 0;
   }
-  const std::size_t about = m.motion == MotionKind::mean_speed ? 1 : 0;
+  const std::size_t about = (m.motion == MotionKind::mean_speed ? 1 : 0) + (m.smoothing.upper > 0.0 ? 1 : 0);
   if (m.delay.lower != 0.0 || m.delay.upper != 0.0) {
     return about + 2 + static_cast<std::size_t>(std::ceil(m.delay.width() / m.nominal_step));
   }
-  return m.changes == model::EffortChanges::at_samples ? 0 : about + (m.hold == Hold::zero_order ? 1 : 3);
+  return m.changes == model::EffortChanges::at_samples && m.smoothing.upper == 0.0
+             ? 0
+             : about + (m.hold == Hold::zero_order ? 1 : 3);
 }
 
 ReferenceMotion walk(LogSource& log, RegressorFilter filter) {

@@ -231,6 +231,7 @@ Measurement measurement_at(const JsonPlace& place, const Model& model, const Rob
   m.shortest_step = bound_at(place.at("shortest_step"));
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
+  m.smoothing = robot.effort_smoothing;
   m.clock_drift = robot.clock ? robot.clock->drift : 0.0;
   m.correction = filter::effort_correction(robot, m.motion != MotionKind::angle);
   if (m.motion == MotionKind::speed) {

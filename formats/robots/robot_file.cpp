@@ -189,7 +189,7 @@ struct RobotReader {
 
   void read_measurement(const std::string& key, const YamlPlace& place) {
     if (key == "effort") {
-      for (const auto& [name, value] : place.members({"kind", "hold", "unsigned", "changes", "delay"})) {
+      for (const auto& [name, value] : place.members({"kind", "hold", "unsigned", "changes", "delay", "smoothing"})) {
         if (name == "kind") {
           robot.effort = static_cast<model::EffortKind>(value.choice({"torque", "current", "voltage"}));
         } else if (name == "hold") {
@@ -198,6 +198,8 @@ struct RobotReader {
           robot.effort_changes = static_cast<model::EffortChanges>(value.choice({"between", "at_samples"}));
         } else if (name == "delay") {
           robot.effort_delay = delay(value);
+        } else if (name == "smoothing") {
+          robot.effort_smoothing = delay(value, 0.0);
         } else {
           robot.effort_unsigned = value.boolean();
         }
@@ -270,10 +272,11 @@ struct RobotReader {
     robot.speed_filter = filter;
   }
 
-  static Interval delay(const YamlPlace& place) {
-    const std::string_view expected = "seconds between -1 and 1, or two such numbers [lo, hi] with lo <= hi";
+  static Interval delay(const YamlPlace& place, double least = -longest_delay) {
+    const std::string expected =
+        fmt::format("seconds between {:g} and {:g}, or two such numbers [lo, hi] with lo <= hi", least, longest_delay);
     const auto seconds = [&](const YamlPlace& end) {
-      return end.number(expected, [](double value) { return std::abs(value) <= longest_delay; });
+      return end.number(expected, [&](double value) { return value >= least && value <= longest_delay; });
     };
     if (place.is_scalar()) {
       const double both = seconds(place);
@@ -527,6 +530,9 @@ Json to_json(const Robot& robot) {
                    {"unsigned", robot.effort_unsigned},
                    {"changes", changes[static_cast<std::size_t>(robot.effort_changes)]},
                    {"delay", Json::array({robot.effort_delay.lower, robot.effort_delay.upper})}};
+  if (robot.effort_smoothing != Interval{}) {
+    out["effort"]["smoothing"] = Json::array({robot.effort_smoothing.lower, robot.effort_smoothing.upper});
+  }
   for (const auto& [name, value] : robot.nominal) {
     out["nominal"][name] = value;
   }

@@ -41,6 +41,14 @@ ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors 
   check::that(!ranged_ || measurement_.nominal_step > 0.0, "effort delay", "a measurement with a nominal step");
   check::that(!ranged_ || measurement_.correction.empty(), "effort delay",
               "efforts that no effect of the robot corrects (effects know a delay of their own)");
+  check::that(measurement_.smoothing.lower >= 0.0 && measurement_.smoothing.lower <= measurement_.smoothing.upper,
+              "effort smoothing", "0 <= lower <= upper");
+  if (measurement_.smoothing.upper > 0.0) {
+    check::that(measurement_.nominal_step > 0.0, "effort smoothing", "a measurement with a nominal step");
+    check::that(measurement_.correction.empty() && !measurement_.effort_unsigned, "effort smoothing",
+                "efforts with a sign, which no effect of the robot corrects");
+    sharpening_ = measurement_.sharpening();
+  }
   angles_ = measurement_.motion != MotionKind::speed;
   const bool mean = measurement_.motion == MotionKind::mean_speed;
   std::size_t back = 3;
@@ -62,7 +70,7 @@ ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors 
   }
   enclosure_ = StepEnclosure(model_, errors_.between_samples ? errors_.motion : MotionBound{});
   const Eigen::VectorXd joint_zero = Eigen::VectorXd::Zero(joints), output_zero = Eigen::VectorXd::Zero(n);
-  ring_.assign(ahead_ + back, Sample{0.0, joint_zero, joint_zero, joint_zero, joint_zero, 0.0});
+  ring_.assign(ahead_ + back, Sample{0.0, joint_zero, joint_zero, joint_zero, joint_zero, joint_zero, joint_zero});
   speed_ = speed_before_ = Eigen::VectorXd::Zero(coordinates);
   joint_speed_ = low_ = high_ = scratch_ = falling_in_ = rising_in_ = joint_zero;
   steps_.fill(StepMotion(model_));
@@ -125,6 +133,9 @@ void ElementFilter::read_effort(Sample& now, std::span<const double> sample) {
       now.effort[i] = value;
     }
   }
+  if (sharpening_.upper > 0.0) {
+    sharpen(now, before);
+  }
   if (corrector_.empty()) {
     now.over = before.effort;
     return;
@@ -136,6 +147,20 @@ void ElementFilter::read_effort(Sample& now, std::span<const double> sample) {
     now.effort[i] = corrector_.now(j);
     now.doubt[i] = corrector_.doubt(j);
   }
+}
+
+// The effort of a row before it was smoothed: y + κ(y − that of the row before).
+void ElementFilter::sharpen(Sample& now, const Sample& before) {
+  now.logged = now.effort;
+  now.sharp = samples_ > 1 && !(longest_ > 0.0 && now.t - before.t > longest_);
+  const double middle = 0.5 * (sharpening_.lower + sharpening_.upper), half = sharpening_.upper - middle;
+  const bool held = measurement_.hold == Hold::zero_order && measurement_.changes == model::EffortChanges::at_samples;
+  each(now.effort.size(), [&](Eigen::Index j) {
+    const double change = now.sharp ? now.logged[j] - before.logged[j] : 0.0;
+    now.effort[j] = now.logged[j] + middle * change;
+    now.own_doubt[j] = half * std::abs(change);
+    now.doubt[j] = held ? before.own_doubt[j] : std::max(before.own_doubt[j], now.own_doubt[j]);
+  });
 }
 
 void ElementFilter::measure_motion(const Sample& now, const Sample& before) {
@@ -177,9 +202,16 @@ bool ElementFilter::effort_is_known(std::size_t age) const {
                  to = sample(age).t + shift + measurement_.delay.upper;
     const std::size_t kept = std::min(samples_, ring_.size());
     for (std::size_t k = 0; k + 1 < kept; ++k) {
-      if (sample(k).t > from && sample(k + 1).t < to && lost_before(k)) {
+      const bool about = sample(k).t > from && sample(k + 1).t < to;
+      if (about && (lost_before(k) || !sample(k).sharp || !sample(k + 1).sharp)) {
         return false;
       }
+    }
+    return true;
+  }
+  for (std::size_t k = mean ? age - 1 : held ? age + 1 : age; k <= age + 1; ++k) {
+    if (!sample(k).sharp) {
+      return false;
     }
   }
   return true;
@@ -200,8 +232,8 @@ void ElementFilter::effort_of_range(double begin, double end) {
       continue;
     }
     for (Eigen::Index j = 0; j < low_.size(); ++j) {
-      low_[j] = std::min(low_[j], sample(k).effort[j]);
-      high_[j] = std::max(high_[j], sample(k).effort[j]);
+      low_[j] = std::min(low_[j], sample(k).effort[j] - sample(k).own_doubt[j]);
+      high_[j] = std::max(high_[j], sample(k).effort[j] + sample(k).own_doubt[j]);
     }
   }
 }
@@ -264,7 +296,7 @@ bool ElementFilter::measure_effort(std::size_t age) {
   }
   StepEffort& e = present_effort();
   each(joints, [&](Eigen::Index j) {
-    scratch_[j] = mean ? std::max(now.doubt[j], sample(age - 1).doubt[j]) : now.doubt[j];
+    scratch_[j] = ranged_ ? 0.0 : mean ? std::max(now.doubt[j], sample(age - 1).doubt[j]) : now.doubt[j];
     low_[j] -= scratch_[j];
     high_[j] += scratch_[j];
   });
@@ -459,7 +491,7 @@ ElementFilter::EffortWeights ElementFilter::effort_weights() const {
   const bool held = measurement_.hold == Hold::zero_order;
   const bool mean = measurement_.motion == MotionKind::mean_speed;
   const bool between = measurement_.changes == model::EffortChanges::between;
-  if (ranged_ || !corrector_.empty() || measurement_.effort_unsigned || (held && between)) {
+  if (ranged_ || sharpening_.upper > 0.0 || !corrector_.empty() || measurement_.effort_unsigned || (held && between)) {
     return {};
   }
   const double a = element_.before, b = element_.step;

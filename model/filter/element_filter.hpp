@@ -116,9 +116,12 @@ class ElementFilter {
   struct Sample {
     double t = 0.0;
     Eigen::VectorXd joint;
-    Eigen::VectorXd effort;  // at the stamp
-    Eigen::VectorXd over;    // held efforts: what acts in the step that ends at the stamp
-    Eigen::VectorXd doubt;   // of a corrected effort in the step that ends at the stamp
+    Eigen::VectorXd effort;     // at the stamp
+    Eigen::VectorXd over;       // held efforts: what acts in the step that ends at the stamp
+    Eigen::VectorXd doubt;      // of a corrected effort in the step that ends at the stamp
+    Eigen::VectorXd logged;     // effort
+    Eigen::VectorXd own_doubt;  // of the effort at the stamp, where it is sharpened
+    bool sharp = true;          // false: the row before it is not known, by which it would be sharpened
     double heading = 0.0;
   };
   // Integrals of a step's effort with weights that fall from 1 to 0 and rise from 0 to 1, over its length; doubt alike.
@@ -136,6 +139,7 @@ class ElementFilter {
   [[nodiscard]] const StepEffort& previous_effort() const { return efforts_[1 - newest_step_]; }
   void read(double t, std::span<const double> sample);
   void read_effort(Sample& now, std::span<const double> sample);
+  void sharpen(Sample& now, const Sample& before);
   [[nodiscard]] bool take();
   bool describe(std::size_t age);
   void measure_motion(const Sample& now, const Sample& before);
@@ -159,6 +163,7 @@ class ElementFilter {
   bool angles_ = false;    // steps between angles, measured or those behind mean speeds
   std::size_t ahead_ = 0;  // samples that efforts are known ahead of the motion that is filtered
   bool ranged_ = false;    // efforts are late by an unknown time
+  Interval sharpening_{};  // Measurement::sharpening()
   double longest_ = 0.0;   // s: in a longer step rows are lost; 0: not known
   bool bridges_ = false;
   std::vector<std::size_t> functions_;

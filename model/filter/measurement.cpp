@@ -97,6 +97,11 @@ double Measurement::longest_step() const {
                              : kHole * nominal_step;
 }
 
+Interval Measurement::sharpening() const {
+  const auto at = [&](double time) { return time > 0.0 ? 1.0 / std::expm1(nominal_step / time) : 0.0; };
+  return {at(smoothing.lower), at(smoothing.upper)};
+}
+
 std::vector<std::string> Measurement::columns() const {
   std::vector<std::string> all = motion_columns;
   all.insert(all.end(), effort_columns.begin(), effort_columns.end());
@@ -111,6 +116,7 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   m.hold = robot.hold;
   m.changes = robot.effort_changes;
   m.delay = robot.effort_delay;
+  m.smoothing = robot.effort_smoothing;
   m.clock_drift = robot.clock ? robot.clock->drift : 0.0;
   m.effort_unsigned = robot.effort_unsigned;
   m.nominal_step = log.median_step();

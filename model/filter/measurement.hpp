@@ -61,12 +61,22 @@ struct Measurement {
   model::EffortChanges changes =
       model::EffortChanges::between;  ///< what an effort may do between two samples, beside `hold`
   Interval delay{0.0, 0.0};           ///< s, holds the constant time by which logged efforts are late
+  Interval smoothing{0.0, 0.0};       ///< s, holds the time constant of the filter that efforts passed through
+                                      ///< (Robot::effort_smoothing), which is undone: sharpening()
   double clock_drift = 0.0;           ///< bound of the relative error of the times between samples (core::EvenClock)
 
   /// A longer step between two samples is a hole in the log: nothing is known of the effort in it, s; 0 where no step
   /// is known. 1.75 nominal steps, for steps that vary less: as long as two of the shortest together, but at least 1.35
   /// nominal steps; for mean speeds, whose interval is one step, 1.05 of these.
   [[nodiscard]] double longest_step() const;
+
+  /// κ = 1/(e^{h/T} − 1) over `smoothing`, at the nominal step h: the effort of row k was y_k + κ(y_k − y_{k−1}).
+  [[nodiscard]] Interval sharpening() const;
+
+  /// By how much a bound on the error of the effort of joint `j` grows from the logged value to the one that acted.
+  [[nodiscard]] double effort_gain(std::size_t j) const {
+    return correction.gain_of(j) * (1.0 + 2.0 * sharpening().upper);
+  }
 
   /// Columns in the order in which RegressorFilter wants a sample: motion, effort, heading where there is one.
   [[nodiscard]] std::vector<std::string> columns() const;

@@ -58,7 +58,7 @@ Energies impulse_energies(const FilterDesign& d, MotionKind motion, Hold hold, d
 Eigen::MatrixXd corrected_input(const Model& model, const Measurement& measurement) {
   Eigen::MatrixXd input = model.input;
   for (Eigen::Index j = 0; j < input.cols(); ++j) {
-    input.col(j) *= measurement.correction.gain_of(static_cast<std::size_t>(j));
+    input.col(j) *= measurement.effort_gain(static_cast<std::size_t>(j));
   }
   return input;
 }
@@ -171,11 +171,8 @@ ErrorInfluence::ErrorInfluence(const Model& model, const FilterDesign& design, c
       angles_(measurement.motion != MotionKind::speed),
       sensors_(sensors),
       nominal_(measurement.nominal_step),
-      input_(model.input),
+      input_(corrected_input(model, measurement)),
       motion_(model.motion) {
-  for (Eigen::Index j = 0; j < input_.cols(); ++j) {
-    input_.col(j) *= measurement.correction.gain_of(static_cast<std::size_t>(j));
-  }
   const auto n = static_cast<Eigen::Index>(model.n()), c = model.motion.rows();
   acceleration_ = speed_ = Eigen::MatrixXd::Zero(c, n);
   for (const Term& term : model.terms) {
