@@ -242,14 +242,16 @@ void RegressorFilter::write_row() {
       dY[k] += drift * (2.0 + drift) * std::abs(Y[k]);
     }
   }
-  const bool corrected = !elements_.corrector().empty();  // its doubt is no matter of what happens between samples
+  // Doubt of a correction, a filter or a delay is no matter of what happens between samples.
+  const bool doubted = !elements_.corrector().empty() || measurement().smoothing.upper > 0.0 ||
+                       measurement().delay.lower < measurement().delay.upper;
   // Where the motion's errors are not known the output's bound stands for them.
   const double rougher = errors.joint_sample > 0.0 ? 1.0 : 1.0 + rough();
   const double area = (bounded ? std::max(1.0, out[area_] / static_gain_) : 1.0) * rougher;
   for (Eigen::Index i = 0; i < row_.y.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     row_.y[i] = out[torque_ + k];
-    row_.dy[i] = area * errors.output[i] + (bounded || corrected ? out[torque_doubt_ + k] : 0.0);
+    row_.dy[i] = area * errors.output[i] + (bounded || doubted ? out[torque_doubt_ + k] : 0.0);
   }
 }
 
