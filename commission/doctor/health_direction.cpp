@@ -65,7 +65,8 @@ std::size_t span_of(const HealthView& view, const JointView& joint, const std::v
   return static_cast<std::size_t>(std::max(1.0, std::ceil(seconds / view.step)));
 }
 
-// Rows at which the speed jumps from one value to its opposite, as nothing that the efforts could do.
+// Rows at which the speed jumps from one value to its opposite, as nothing that the efforts could do, and keeps its
+// sign before and after as a drive does, and noise does not.
 std::vector<std::size_t> jumps_of_sign(const HealthView& view, const JointView& joint,
                                        const std::vector<double>& column, bool angle, std::size_t& crossings) {
   const std::size_t span = span_of(view, joint, column, angle);
@@ -94,10 +95,12 @@ std::vector<std::size_t> jumps_of_sign(const HealthView& view, const JointView& 
   const double per_change = aa > 0.0 ? ea / aa : 0.0;  // effort that changes the speed by one unit from row to row
   std::vector<std::size_t> found;
   double side = 0.0;  // of the last speed that was not slow
-  crossings = 0;
+  std::vector<std::size_t> turns;
   each([&](std::size_t k, const Sides& s) {
     if (std::abs(s.after) > kSlowest * joint.top) {
-      crossings += side * s.after < 0.0 ? 1 : 0;
+      if (side * s.after < 0.0) {
+        turns.push_back(k);
+      }
       side = s.after;
     }
     if (!jumps(s)) {
@@ -111,6 +114,13 @@ std::vector<std::size_t> jumps_of_sign(const HealthView& view, const JointView& 
     if (!taken && (found.empty() || k > found.back() + 2 * span)) {
       found.push_back(k);
     }
+  });
+  crossings = turns.size();
+  std::erase_if(found, [&](std::size_t k) {
+    return std::ranges::any_of(turns, [&](std::size_t turn) {
+      const std::size_t apart = turn > k ? turn - k : k - turn;
+      return apart > 2 * span && static_cast<double>(apart) * view.step < kShortestPiece;
+    });
   });
   return found;
 }
