@@ -210,8 +210,7 @@ std::optional<filter::ErrorClasses> error_classes(const Robot& robot, const Meas
 }
 
 Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& joint_limit) {
-  return model.motion.cwiseAbs() *
-         Eigen::Map<const Eigen::VectorXd>(joint_limit.data(), static_cast<Eigen::Index>(joint_limit.size()));
+  return model.motion.cwiseAbs().rowwise().sum() * *std::ranges::max_element(joint_limit);
 }
 
 }  // namespace wheelwright::commission

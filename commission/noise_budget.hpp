@@ -83,7 +83,7 @@ struct NoiseBudget {
 [[nodiscard]] filter::ErrorClasses classes_with(const Robot& robot, const Measurement& measurement, double motion,
                                                 const filter::ErrorClass& effort);
 
-/// `limit` of each joint (acceleration_limit) as one of each coordinate of `model`.
+/// The largest limit of a joint (acceleration_limit) as one of each coordinate of `model` (filter::MotionBound::limit).
 [[nodiscard]] Eigen::VectorXd coordinate_limit(const Model& model, const std::vector<double>& joint_limit);
 
 /// Bound on the error of the motion column alone, where the robot file or the encoder tells it: rad for angles and mean

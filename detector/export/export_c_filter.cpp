@@ -66,12 +66,19 @@ Eigen::MatrixXd friction_rate(const Model& model, const filter::MotionBound& bou
   return rate;
 }
 
-Eigen::MatrixXd joints_from_coordinates(const Model& model) {
+Eigen::MatrixXd joints_from_coordinates(const Model& model, const Eigen::VectorXd& limit) {
   const Eigen::MatrixXd inverse = core::pseudo_inverse(model.motion);
   const bool determined =
       (inverse * model.motion - Eigen::MatrixXd::Identity(inverse.rows(), inverse.rows())).cwiseAbs().maxCoeff() < 1e-9;
-  return determined ? Eigen::MatrixXd(kOutward * inverse.cwiseAbs())
-                    : Eigen::MatrixXd::Constant(inverse.rows(), inverse.cols(), core::kInfinity);
+  Eigen::MatrixXd from = Eigen::MatrixXd::Constant(inverse.rows(), inverse.cols() + 1, core::kInfinity);
+  if (determined) {
+    from.leftCols(inverse.cols()) = kOutward * inverse.cwiseAbs();
+  }
+  if (limit.size() > 0) {
+    from.col(inverse.cols())
+        .setConstant(kOutward * limit.cwiseQuotient(model.motion.cwiseAbs().rowwise().sum()).minCoeff());
+  }
+  return from;
 }
 
 // "scale * ", or nothing for 1.
@@ -146,6 +153,10 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds, bool sums
   heading_ = uses({TermShape::along_x, TermShape::along_y});
   measured_heading_ = heading_ && !measurement_.heading_column.empty();
   joints_ = uses({TermShape::sum_of_signs, TermShape::difference_of_signs});
+  sided_ = moved_ && (joints_ || uses({TermShape::sign_of_speed}));
+  if (moved_ && held_ && !between_ && !mean_ && !measurement_.effort_unsigned && (mobile_ || !nodes_)) {
+    flow_ = filter::flow_kind(model_);
+  }
   viscous_ = any_kind(model_, Term::Kind::speed);
   inertial_ = any_kind(model_, Term::Kind::acceleration);
   linear_ = !held_ && between_;
@@ -167,15 +178,16 @@ FilterWriter::FilterWriter(const RegressorFilter& filter, bool bounds, bool sums
   cut_ = bounds_ && bridged_ && any_not_zero(errors_.speed_sample) && (inertial_ || (nodes_ && viscous_));
   edge_ = cut_ || rough_;
   area_ = bounds_ && bounded_ && any_not_zero(errors_.output);
-  joint_error_ = joints_;
-  speed_error_ = (mobile_ && viscous_) || heading_ || uses({TermShape::sign_of_speed});
+  joint_error_ = joints_ || sided_;
+  speed_error_ =
+      flow_ != filter::FlowKind::none || (mobile_ && viscous_) || heading_ || uses({TermShape::sign_of_speed});
   ahead_ = mean_ ? 1 : 0;
   samples_ = ahead_ + (linear_ && (!mean_ || doubted_) ? 3 : 2);
   if (mobile_) {
     rate_ = friction_rate(model_, motion);
   }
-  if (joints_ && moved_) {
-    joint_from_ = joints_from_coordinates(model_);
+  if (sided_) {
+    joint_from_ = joints_from_coordinates(model_, motion.limit);
   }
 }
 
@@ -198,7 +210,7 @@ std::string FilterWriter::segment_words() const {
       " * detector; {} of more than {:.6g} s (rows are lost) {}{}.",
       measurement_.nominal_step, bridged_ ? "a step" : "after a step", measurement_.longest_step(),
       bridged_ ? "is left out of what is summed up" : "the filter has to settle anew",
-      !(mobile_ && !limited_ && viscous_) ? ""
+      !(mobile_ && !limited_ && viscous_) || (nodes_ ? rate_.isDiagonal(0.0) : flow_ == filter::FlowKind::separate) ? ""
       : bridged_ ? ".\n * The filter has to settle anew after a step that is too long for the robot's friction"
                  : ", as it has after a step\n * that is too long for the robot's friction");
 }
@@ -264,17 +276,26 @@ std::string FilterWriter::types() const {
   out.line_if(bridged_, "  int known; /* 0: efforts in it are not */");
   out.line("  double speed[PFX_COORDINATES]; /* mean over the step */");
   out.line_if(speed_error_, "  double speed_error[PFX_COORDINATES]; /* what the samples are wrong by */");
-  out.line_if(joints_, "  double joint_speed[PFX_JOINTS], joint_error;");
+  out.line_if(joint_error_, "  double joint_speed[PFX_JOINTS], joint_error;");
+  out.line_if(sided_, "  int moving[PFX_JOINTS]; /* it never stands or turns round in the step */");
   out.line_if(heading_, "  double heading; /* rad, in its middle */");
   out.line_if(uses({TermShape::along_x}), "  double along_x; /* square of its cosine */");
   out.line_if(uses({TermShape::along_y}), "  double along_y; /* square of its sine */");
-  out.line_if(moved_, "  double acceleration[PFX_COORDINATES]; /* its size is at most this in the step */");
+  if (moved_) {
+    out.line("  double acceleration[PFX_COORDINATES]; /* its size is at most this in the step */");
+    out.line("  double departure[PFX_COORDINATES]; /* speeds are within this of their mean */");
+  }
+  if (flow_ != filter::FlowKind::none) {
+    out.line("  int steady; /* coordinates go one way, less and less fast */");
+    out.line_if(!nodes_, "  double gain[PFX_COORDINATES], bow[PFX_COORDINATES]; /* of the speed; of its mean */");
+  }
   out.line_if(!functions_.empty(),
               "  double term[{0}], term_error[{0}]; /* functions of the motion, at every instant */",
               functions_.size());
   out.line("  double falling[PFX_CHANNELS]{}; /* effort, with weights that fall from 1 to 0{} */",
            split_ ? ", rising[PFX_CHANNELS]" : "", split_ ? ", rise from 0 to 1" : " (and rise)");
-  out.line_if(mobile_, "  double effort[PFX_CHANNELS]; /* its largest size */");
+  out.line_if(mobile_,
+              "  double effort[PFX_CHANNELS], effort_error[PFX_CHANNELS]; /* its middle, and how far from it */");
   out.line_if(change_, "  double change[PFX_CHANNELS]; /* half the range of efforts in the step */");
   out.put("} pfx_span;\n\n/* What samples were so far. */\ntypedef struct pfx_elements {\n");
   out.line("  int samples, instants; /* samples, and instants of the recursion, in this segment: counted up to 3 */");
@@ -403,6 +424,7 @@ void FilterWriter::read(Text& out) const {
 }
 
 void FilterWriter::evaluate(Text& out) const {
+  reach(out);
   if (functions_.empty()) {
     return;
   }
@@ -410,13 +432,13 @@ void FilterWriter::evaluate(Text& out) const {
   const int turning = heading_ && moved_ ? model_.heading_coordinate : -1;
   const bool joints_in_doubt = joints_ && (moved_ || errors_.joint_sample > 0.0);
   const auto widened = [&](int c) {
-    return moved_ ? fmt::format("PFX_UP * (p->speed_error[{0}] + half * p->acceleration[{0}])", c)
+    return moved_ ? fmt::format("PFX_UP * (p->speed_error[{0}] + p->departure[{0}])", c)
                   : fmt::format("p->speed_error[{}]", c);
   };
   out.put(
       "\n/* Functions of the motion, and by how much each can be wrong, for every instant of the step. */\n"
       "static inline void pfx_evaluate(pfx_span *p)\n{\n");
-  out.line_if(moved_ && (first_speed || joints_in_doubt), "  const double half = 0.5 * p->length;");
+  out.line_if(turning >= 0, "  const double half = 0.5 * p->length;");
   out.line_if(first_speed, "  const double speed_error = {};", widened(0));
   if (heading_) {
     const std::string turned =
@@ -427,16 +449,10 @@ void FilterWriter::evaluate(Text& out) const {
   }
   if (joints_) {
     out.line("  double sign[2]{};", joints_in_doubt ? ", doubt[2]" : "");
-    out.line_if(joints_in_doubt && moved_, "  static const double joint_from[PFX_JOINTS][PFX_COORDINATES] = {};",
-                numbers(joint_from_));
-    out.line("  int i{};", joints_in_doubt && moved_ ? ", c" : "");
+    out.line("  int i;");
     out.line("  for (i = 0; i < 2; ++i) {{");
     if (joints_in_doubt && moved_) {
-      out.line("    double faster = 0.0, error;");
-      out.line("    for (c = 0; c < PFX_COORDINATES; ++c) {{");
-      out.line("      faster += p->acceleration[c] > 0.0 ? joint_from[i][c] * p->acceleration[c] : 0.0;");
-      out.line("    }}");
-      out.line("    error = PFX_UP * (p->joint_error + half * faster);");
+      out.line("    const double error = p->moving[i] ? 0.0 : pfx_joint_reach(p, i, p->departure);");
     } else if (joints_in_doubt) {
       out.line("    const double error = p->joint_error;");
     }
@@ -474,7 +490,8 @@ void FilterWriter::evaluate(Text& out) const {
         break;
       case TermShape::sign_of_speed:
         out.line("  {{");
-        out.line("    const int doubt = fabs(p->speed[0]) <= speed_error;");
+        out.line("    const int doubt = {}fabs(p->speed[0]) <= speed_error;",
+                 sided_ && model_.coordinates.size() == 1 && model_.joints.size() == 1 ? "!p->moving[0] && " : "");
         out.line("    p->term[{}] = doubt ? 0.0 : p->speed[0] > 0.0 ? {} : {};", k, hex(term.scale), hex(-term.scale));
         out.line("    p->term_error[{}] = doubt ? {} : 0.0;", k, hex(std::abs(term.scale)));
         out.line("  }}");
@@ -493,42 +510,76 @@ void FilterWriter::evaluate(Text& out) const {
 void FilterWriter::solve(Text& out) const {
   const filter::MotionBound& motion = errors_.motion;
   const std::size_t coordinates = model_.coordinates.size();
+  const bool apart = rate_.isDiagonal(0.0);
   out.put(
       "\n/* Bounds on accelerations: the inverse inertia, and that times viscous friction, over the feasible set. "
       "*/\n");
   out.line("static const double pfx_mobility[PFX_COORDINATES][PFX_CHANNELS] = {};", numbers(motion.mobility));
   out.line_if(viscous_, "static const double pfx_rate[PFX_COORDINATES][PFX_COORDINATES] = {};", numbers(rate_));
   out.put(
-      "\n/* Bounds the accelerations in the step by all forces; 0 where it is too long for the robot's friction. */\n"
-      "static inline int pfx_solve(const pfx_span *p, double *next)\n{\n");
-  out.line_if(viscous_, "  const double half = 0.5 * p->length;");
-  out.line("  double force[PFX_CHANNELS];");
+      "\n/* A parameter of at most `largest` times a value moves the ends of a force; `either`: it may be below 0. */\n"
+      "static inline void pfx_push(double *high, double *low, double largest, double value, double error, int either)"
+      "\n{\n");
+  out.line("  double below = error - value, above = error + value;");
+  out.line("  if (either) {{");
+  out.line("    below = above = below < above ? above : below;");
+  out.line("  }}");
+  out.line("  *high += largest * (below < 0.0 ? 0.0 : below);");
+  out.line("  *low += largest * (above < 0.0 ? 0.0 : above);");
+  out.put(
+      "}\n\n/* Accelerations by efforts and friction, where the speed is its mean. */\n"
+      "static inline void pfx_force(const pfx_span *p, double *next)\n{\n");
+  out.line("  double force[PFX_CHANNELS], low[PFX_CHANNELS];");
   out.line("  int c, i;");
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
-  out.line("    force[i] = p->effort[i];");
+  out.line("    force[i] = p->effort[i] + p->effort_error[i];");
+  out.line("    low[i] = p->effort_error[i] - p->effort[i];");
   out.line("  }}");
   std::size_t k = 0;
   for (const Term& term : model_.terms) {
     if (term.kind == Term::Kind::acceleration) {
       continue;
     }
-    const std::string size = term.kind == Term::Kind::speed
-                                 ? fmt::format("{0}(fabs(p->speed[{1}]) + p->speed_error[{1}])",
-                                               times(std::abs(term.scale)), term.coordinate)
-                                 : fmt::format("(fabs(p->term[{0}]) + p->term_error[{0}])", k);
+    const model::Parameter& parameter = model_.parameters[term.parameter];
+    const std::string value = term.kind == Term::Kind::speed
+                                  ? fmt::format("{0}p->speed[{1}], {2}p->speed_error[{1}]", times(term.scale),
+                                                term.coordinate, times(std::abs(term.scale)))
+                                  : fmt::format("p->term[{0}], p->term_error[{0}]", k);
     k += term.kind == Term::Kind::function ? 1 : 0;
-    out.line("  force[{}] += {} * {}; /* {} */", term.output,
-             hex(motion.largest[static_cast<Eigen::Index>(term.parameter)]),
-             term.kind == Term::Kind::speed && std::abs(term.scale) != 1.0 ? "(" + size + ")" : size,
-             plain(model_.parameters[term.parameter].name));
+    out.line("  pfx_push(&force[{0}], &low[{0}], {1}, {2}, {3}); /* {4} */", term.output,
+             hex(motion.largest[static_cast<Eigen::Index>(term.parameter)]), value, parameter.never_negative ? 0 : 1,
+             plain(parameter.name));
   }
+  out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
+  out.line("    force[i] = force[i] < low[i] ? low[i] : force[i];");
+  out.line("  }}");
   out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
   out.line("    next[c] = pfx_mobility[c][0] * force[0];");
   out.line("    for (i = 1; i < PFX_CHANNELS; ++i) {{");
   out.line("      next[c] += pfx_mobility[c][i] * force[i];");
   out.line("    }}");
   out.line("  }}");
-  if (viscous_ && coordinates == 2) {
+  out.put(
+      "}\n\n/* Bounds the accelerations in the step by all forces; 0 where it is too long for the robot's friction. "
+      "*/\n"
+      "static inline int pfx_solve(const pfx_span *p, double *next)\n{\n");
+  out.line_if(viscous_ && !(apart && nodes_), "  const double half = 0.5 * p->length;");
+  out.line("  int c;");
+  out.line("  pfx_force(p, next);");
+  if (viscous_ && apart && nodes_) {
+    out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
+    out.line("    const double longer = 1.0 + p->length * pfx_rate[c][c] / 6.0;");
+    out.line("    next[c] *= 2.0 < longer ? 2.0 : longer;");
+    out.line("  }}");
+  } else if (viscous_ && apart) {
+    out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
+    out.line("    const double left = 1.0 - half * pfx_rate[c][c];");
+    out.line("    if (!(left > 0.0)) {{");
+    out.line("      return 0;");
+    out.line("    }}");
+    out.line("    next[c] /= left;");
+    out.line("  }}");
+  } else if (viscous_ && coordinates == 2) {
     out.line("  {{");
     out.line("    const double a = 1.0 - half * pfx_rate[0][0], d = 1.0 - half * pfx_rate[1][1];");
     out.line("    const double b = half * pfx_rate[0][1], c01 = half * pfx_rate[1][0], determinant = a * d - b * c01;");
@@ -554,7 +605,7 @@ void FilterWriter::solve(Text& out) const {
     out.line("    next[c] /= left;");
     out.line("  }}");
   }
-  if (coordinates > 2) {
+  if (coordinates > 2 && !apart) {
     out.line("  for (c = 1; c < PFX_COORDINATES; ++c) {{");
     out.line("    next[0] = next[0] < next[c] ? next[c] : next[0];");
     out.line("  }}");
@@ -569,65 +620,248 @@ void FilterWriter::solve(Text& out) const {
   out.put("}\n");
 }
 
-void FilterWriter::enclose(Text& out) const {
-  if (!moved_) {
-    return;
-  }
-  if (mobile_) {
-    solve(out);
-  }
+// StepEnclosure::by_dynamics(); `settled` where accelerations are solved for.
+void FilterWriter::by_dynamics(Text& out) const {
   const bool functions = !functions_.empty();
-  const char* evaluated = functions ? "  pfx_evaluate(p);\n" : "";
+  const auto depart = [&](const char* indent) {
+    out.line("{}for (c = 0; c < PFX_COORDINATES; ++c) {{", indent);
+    out.line("{}  p->departure[c] = half * p->acceleration[c];", indent);
+    out.line("{}}}", indent);
+    out.line_if(functions, "{}pfx_evaluate(p);", indent);
+  };
   out.put(
-      "\n/* Bounds the accelerations in the step; 0 where that cannot be done. */\n"
-      "static inline int pfx_enclose(pfx_span *p)\n{\n");
-  out.line_if(limited_, "  static const double limit[PFX_COORDINATES] = {};",
-              limited_ ? numbers(errors_.motion.limit) : "");
-  if (!mobile_) {
-    out.line("  int c;");
-    out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
-    out.line("    p->acceleration[c] = limit[c];");
-    out.line("  }}");
-    out.put(evaluated);
-    out.line("  return 1;");
-    out.put("}\n");
-    return;
+      "\n/* Bounds the motion in the step by forces and inertia, and by the limit; 0 where nothing does. */\n"
+      "static inline int pfx_by_dynamics(pfx_span *p)\n{\n");
+  if (limited_) {
+    out.line("  static const double limit[PFX_COORDINATES] = {};", numbers(errors_.motion.limit));
   }
-  if (functions) {
-    out.line("  double next[PFX_COORDINATES];");
-    out.line("  int c, round, settled = 0;");
+  out.line("  const double half = 0.5 * p->length;");
+  out.line_if(mobile_ && functions, "  double next[PFX_COORDINATES];");
+  out.line("  int c{};", !mobile_ ? "" : functions ? ", round, settled = 0" : ", settled");
+  if (mobile_ && functions) {
     out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
     out.line("    p->acceleration[c] = 0.0;");
     out.line("  }}");
-    out.line("  pfx_evaluate(p);");
+    depart("  ");
     out.line("  if (pfx_solve(p, next)) {{");
     out.line("    /* Functions grow with the speed: widened until they agree with what they were evaluated for. */");
     out.line("    for (round = 0; round < {} && !settled; ++round) {{", kWidenings);
     out.line("      for (c = 0; c < PFX_COORDINATES; ++c) {{");
     out.line("        p->acceleration[c] = (round < 2 ? 1.0 : 1.5) * next[c];");
     out.line("      }}");
-    out.line("      pfx_evaluate(p);");
+    depart("      ");
     out.line("      settled = pfx_solve(p, next);");
     out.line("      for (c = 0; c < PFX_COORDINATES; ++c) {{");
     out.line("        settled = settled && next[c] <= p->acceleration[c];");
     out.line("      }}");
     out.line("    }}");
     out.line("  }}");
-  } else if (limited_) {
-    out.line("  int c;");
-    out.line("  const int settled = pfx_solve(p, p->acceleration);");
+  } else if (mobile_) {
+    out.line("  settled = pfx_solve(p, p->acceleration);");
   }
   if (limited_) {
     out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
-    out.line("    if (!settled || limit[c] < p->acceleration[c]) {{");
-    out.line("      p->acceleration[c] = limit[c];");
-    out.line("    }}");
+    out.line("    p->acceleration[c] = {};",
+             mobile_ ? "!settled || limit[c] < p->acceleration[c] ? limit[c] : p->acceleration[c]" : "limit[c]");
     out.line("  }}");
-    out.put(evaluated);
+    depart("  ");
     out.line("  return 1;");
   } else {
-    out.line("  return {};", functions ? "settled" : "pfx_solve(p, p->acceleration)");
+    out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
+    out.line("    p->acceleration[c] = settled ? p->acceleration[c] : HUGE_VAL;");
+    out.line("    p->departure[c] = half * p->acceleration[c];");
+    out.line("  }}");
+    out.line("  return settled;");
   }
+  out.put("}\n");
+}
+
+// StepEnclosure::joint_reach(), moves() and all_move().
+void FilterWriter::reach(Text& out) const {
+  if (!sided_) {
+    return;
+  }
+  out.put(
+      "\n/* By how much the speed of a joint may differ from its mean, where coordinates stay within `departure`. */\n"
+      "static inline double pfx_joint_reach(const pfx_span *p, int j, const double *departure)\n{\n");
+  const Eigen::Index coordinates = joint_from_.cols() - 1;
+  out.line("  static const double joint_from[PFX_JOINTS][PFX_COORDINATES] = {};",
+           numbers(Eigen::MatrixXd(joint_from_.leftCols(coordinates))));
+  out.line("  double faster = 0.0;");
+  out.line("  int c;");
+  out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
+  out.line("    faster += departure[c] > 0.0 ? joint_from[j][c] * departure[c] : 0.0;");
+  out.line("  }}");
+  if (limited_) {
+    out.line("  const double most = 0.5 * p->length * {};", hex(joint_from_(0, coordinates)));
+    out.line("  faster = most < faster ? most : faster;");
+  }
+  out.line("  return PFX_UP * (p->joint_error + faster);");
+  out.put(
+      "}\n\n/* Whether a joint neither stands nor turns round. */\n"
+      "static inline int pfx_moves(const pfx_span *p, int j, const double *departure)\n{\n");
+  out.line("  return p->moving[j] || fabs(p->joint_speed[j]) > pfx_joint_reach(p, j, departure);");
+  out.put("}\n");
+  if (flow_ != filter::FlowKind::none) {
+    out.put("\nstatic inline int pfx_all_move(const pfx_span *p, const double *departure)\n{\n");
+    out.line("  int j, all = 1;");
+    out.line("  for (j = 0; j < PFX_JOINTS && all; ++j) {{");
+    out.line("    all = pfx_moves(p, j, departure);");
+    out.line("  }}");
+    out.line("  return all;");
+    out.put("}\n");
+  }
+}
+
+void FilterWriter::find_moving(Text& out) const {
+  out.put(
+      "\n/* Joints that move on through the step, by the forces on them while they do; whether there are any more. */\n"
+      "static inline int pfx_find_moving(pfx_span *p)\n{\n");
+  out.line("  double next[PFX_COORDINATES];");
+  out.line("  int j, c{}, any = 0, tried = 0, more = 1;", viscous_ ? ", d" : "");
+  out.line("  while (more) {{");
+  out.line("    more = 0;");
+  out.line("    for (j = 0; j < PFX_JOINTS; ++j) {{");
+  out.line("      if (pfx_moves(p, j, p->departure) || !(fabs(p->joint_speed[j]) > p->joint_error)) {{");
+  out.line("        continue;");
+  out.line("      }}");
+  out.line("      tried = p->moving[j] = 1;");
+  out.line("      pfx_evaluate(p);");
+  out.line("      pfx_force(p, next);");
+  out.line("      for (c = 0; c < PFX_COORDINATES; ++c) {{");
+  if (viscous_) {
+    out.line("        for (d = 0; d < PFX_COORDINATES; ++d) {{");
+    out.line("          next[c] += pfx_rate[c][d] * p->departure[d];");
+    out.line("        }}");
+  }
+  out.line("        next[c] *= PFX_UP * 0.5 * p->length;");
+  out.line("      }}");
+  out.line("      p->moving[j] = 0;");
+  out.line("      if (pfx_moves(p, j, next)) {{");
+  out.line("        any = more = p->moving[j] = 1;");
+  out.line("      }}");
+  out.line("    }}");
+  out.line("  }}");
+  out.line("  if (tried && !any) {{");
+  out.line("    pfx_evaluate(p);");
+  out.line("  }}");
+  out.line("  return any;");
+  out.put("}\n");
+}
+
+void FilterWriter::follow_flow(Text& out) const {
+  out.put(
+      fmt::format("\n/* What a gradient flow leaves of the departures: coordinates go one way, less and less fast. */\n"
+                  "static inline void pfx_follow_flow(pfx_span *p{})\n{{\n",
+                  nodes_ ? ", const pfx_span *before" : ""));
+  const bool predicts = nodes_ && flow_ == filter::FlowKind::by_signs && sided_;
+  out.line("  double next[PFX_COORDINATES]{};", predicts ? ", ahead[PFX_COORDINATES]" : "");
+  const bool asks = sided_ && (flow_ == filter::FlowKind::by_signs || (!nodes_ && mobile_));
+  out.line("  int c{};", predicts ? ", moving, j" : asks ? ", moving" : "");
+  out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
+  if (nodes_) {
+    out.line("    next[c] = HUGE_VAL;");
+    out.line("    if (before && before->steady) {{");
+    out.line("      const double apart = fabs(p->speed[c] - before->speed[c]) + p->speed_error[c] +");
+    out.line("                           before->speed_error[c];");
+    out.line("      const double push = pfx_mobility[c][c] * (fabs(p->effort[c] - before->effort[c]) +");
+    out.line("                          p->effort_error[c] + before->effort_error[c]);");
+    out.line("      next[c] = PFX_UP * (apart + 0.5 * before->length * push) / (1.0 + before->length / p->length);");
+    if (predicts) {
+      out.line("      ahead[c] = before->departure[c] +");
+      out.line("                 p->length * (2.0 * before->departure[c] / before->length + push);");
+    }
+    out.line("    }}");
+  } else {
+    out.line("    next[c] = PFX_UP * (0.5 * fabs(p->gain[c]) + p->speed_error[c]);");
+  }
+  out.line("  }}");
+  if (predicts) {
+    out.line("  moving = before && before->steady;");
+    out.line("  for (j = 0; j < PFX_JOINTS && moving; ++j) {{");
+    out.line("    moving = fabs(before->joint_speed[j]) > pfx_joint_reach(before, j, ahead) &&");
+    out.line("             fabs(p->joint_speed[j]) > p->joint_error;");
+    out.line("  }}");
+    out.line("  for (j = 0; j < PFX_JOINTS; ++j) {{");
+    out.line("    p->moving[j] = moving || p->moving[j];");
+    out.line("  }}");
+  }
+  out.line_if(asks, "  moving = pfx_all_move(p, p->departure){};", nodes_ ? "" : " || pfx_all_move(p, next)");
+  out.line("  p->steady = {};", flow_ == filter::FlowKind::separate || !sided_ ? "1" : "moving");
+  out.line("  if (!p->steady) {{");
+  out.line("    return;");
+  out.line("  }}");
+  out.line("  for (c = 0; c < PFX_COORDINATES; ++c) {{");
+  out.line("    p->departure[c] = next[c] < p->departure[c] ? next[c] : p->departure[c];");
+  if (!nodes_) {
+    const std::string least = "p->length * pfx_rate[c][c] / 12.0";
+    out.line("    p->bow[c] = PFX_UP * 2.0 * next[c] * ({});",
+             !mobile_    ? "0.5"
+             : !viscous_ ? (sided_ ? "moving ? 0.0 : 0.5" : "0.0")
+                         : fmt::format("{0}{1} < 0.5 ? {1} : 0.5", sided_ ? "moving && " : "", least));
+  }
+  out.line("  }}");
+  out.put("}\n");
+}
+
+void FilterWriter::enclose(Text& out) const {
+  if (!moved_) {
+    return;
+  }
+  const bool flows = flow_ != filter::FlowKind::none, finds = mobile_ && sided_;
+  if (mobile_) {
+    solve(out);
+  }
+  by_dynamics(out);
+  if (finds) {
+    find_moving(out);
+  }
+  if (flows) {
+    follow_flow(out);
+  }
+  out.put(
+      fmt::format("\n/* Bounds the motion in the step; 0 where that cannot be done. */\n"
+                  "static inline int pfx_enclose(pfx_span *p{})\n{{\n",
+                  flows && nodes_ ? ", const pfx_span *before" : ""));
+  const bool loops = sided_ || flows;
+  out.line_if(loops, "  int i, finite = 1;");
+  if (flows) {
+    out.line("  p->steady = 0;");
+    if (!nodes_) {
+      out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
+      out.line("    p->bow[i] = HUGE_VAL;");
+      out.line("  }}");
+    }
+  }
+  if (sided_) {
+    out.line("  for (i = 0; i < PFX_JOINTS; ++i) {{");
+    out.line("    p->moving[i] = 0;");
+    out.line("  }}");
+  }
+  if (!loops) {
+    out.line("  return pfx_by_dynamics(p);");
+    out.put("}\n");
+    return;
+  }
+  if (finds) {
+    out.line("  if (pfx_by_dynamics(p) && pfx_find_moving(p)) {{");
+    out.line("    pfx_by_dynamics(p);");
+    out.line("  }}");
+  } else {
+    out.line("  pfx_by_dynamics(p);");
+  }
+  if (flows) {
+    out.line("  pfx_follow_flow(p{});", nodes_ ? ", before" : "");
+    if (!functions_.empty()) {
+      out.line("  if (p->steady) {{");
+      out.line("    pfx_evaluate(p);");
+      out.line("  }}");
+    }
+  }
+  out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
+  out.line("    finite = finite && p->departure[i] < HUGE_VAL;");
+  out.line("  }}");
+  out.line("  return finite;");
   out.put("}\n");
 }
 
@@ -670,8 +904,11 @@ void FilterWriter::measure_effort(Text& out) const {
     const bool noisy = any_not_zero(errors_.motion.effort);
     out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
     out.line_if(noisy, "    static const double noise[PFX_CHANNELS] = {};", numbers(errors_.motion.effort));
-    out.line("    p->effort[i] = fabs(p->falling[i] + p->{}[i]){}{};", split_ ? "rising" : "falling",
-             change_ ? " + p->change[i]" : "", noisy ? " + noise[i]" : "");
+    out.line("    p->effort[i] = p->falling[i] + p->{}[i];", split_ ? "rising" : "falling");
+    out.line("    p->effort_error[i] = {}{}{};", change_ ? "p->change[i]" : "", change_ && noisy ? " + " : "",
+             noisy     ? "noise[i]"
+             : change_ ? ""
+                       : "0.0");
     out.line("  }}");
   }
 }
@@ -687,10 +924,12 @@ void FilterWriter::describe(Text& out) const {
   out.line(
       "  const pfx_sample *now = &s->sample[{}]{};", ahead_,
       (before ? fmt::format(", *before = &s->sample[{}]", ahead_ + 1) : "") + (next ? ", *next = &s->sample[0]" : ""));
-  out.line_if(odometry, "  const pfx_span *last = &s->span[!s->newest];");
+  out.line_if(odometry || (flow_ != filter::FlowKind::none && nodes_),
+              "  const pfx_span *last = &s->span[!s->newest];");
   out.line("  pfx_span *p = &s->span[s->newest];");
-  out.line("  double joint_speed[PFX_JOINTS], falling[PFX_JOINTS]{}{};", split_ ? ", rising[PFX_JOINTS]" : "",
-           change_ ? ", range[PFX_JOINTS]" : "");
+  const bool gains = flow_ != filter::FlowKind::none && !nodes_;
+  out.line("  double joint_speed[PFX_JOINTS], falling[PFX_JOINTS]{}{}{};", split_ ? ", rising[PFX_JOINTS]" : "",
+           change_ ? ", range[PFX_JOINTS]" : "", gains ? ", gain[PFX_JOINTS]" : "");
   out.line("  int i;");
   if (mean_ && bridged_) {
     out.line("  p->length = now->t - before->t > PFX_LONGEST ? now->t - before->t : PFX_NOMINAL;");
@@ -701,9 +940,11 @@ void FilterWriter::describe(Text& out) const {
   out.line("    joint_speed[i] = {};", angle_  ? "(now->joint[i] - before->joint[i]) / p->length"
                                        : mean_ ? "now->joint[i]"
                                                : "0.5 * (before->joint[i] + now->joint[i])");
-  out.line_if(joints_, "    p->joint_speed[i] = joint_speed[i];");
+  out.line_if(joint_error_, "    p->joint_speed[i] = joint_speed[i];");
+  out.line_if(gains, "    gain[i] = now->joint[i] - before->joint[i];");
   out.line("  }}");
   out.line("  pfx_coordinates(joint_speed, p->speed);");
+  out.line_if(gains, "  pfx_coordinates(gain, p->gain);");
   if (speed_error_ || joint_error_) {
     const std::string nominal = hex(measurement_.nominal_step);
     const auto error = [&](double sample) {
@@ -741,7 +982,7 @@ void FilterWriter::describe(Text& out) const {
     out.line("  if (!p->known) {{");
     if (moved_) {
       out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");
-      out.line("      p->acceleration[i] = 0.0;");
+      out.line("      p->departure[i] = 0.0;");
       out.line("    }}");
     }
     out.line("    return 1;");
@@ -749,7 +990,9 @@ void FilterWriter::describe(Text& out) const {
   }
   measure_effort(out);
   if (moved_) {
-    out.line("  return pfx_enclose(p);");
+    const bool follows = flow_ != filter::FlowKind::none && nodes_;
+    const std::string last = fmt::format(", s->instants > 0{} ? last : 0", bridged_ ? " && last->known" : "");
+    out.line("  return pfx_enclose(p{});", follows ? last : "");
   } else {
     out.line_if(!functions_.empty(), "  pfx_evaluate(p);");
     out.line("  return 1;");
@@ -856,8 +1099,8 @@ void FilterWriter::make_unknown(Text& out) const {
   out.line_if(nodes_, "  e->run_ends = p->known;");
   if (doubts) {
     out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
-    out.line("    e->motion_doubt[i] = p->acceleration[i] * pfx_cube(h) / 12.0;");
-    out.line_if(sums_, "    e->motion_doubt_before[i] = last->acceleration[i] * pfx_cube(last->length) / 12.0;");
+    out.line("    e->motion_doubt[i] = pfx_moment(p, i);");
+    out.line_if(sums_, "    e->motion_doubt_before[i] = pfx_moment(last, i);");
     out.line("  }}");
   }
   out.put("}\n");
@@ -898,8 +1141,8 @@ void FilterWriter::make_hat(Text& out) const {
   out.line("  for (i = 0; i < PFX_COORDINATES; ++i) {{");
   out.line_if(viscous_, "    e->motion[i] = 0.5 * (before * last->speed[i] + h * p->speed[i]);");
   out.line_if(inertial_, "    e->slope[i] = p->speed[i] - last->speed[i];");
-  out.line_if(moving_, "    e->motion_doubt[i] = p->acceleration[i] * pfx_cube(h) / 12.0;");
-  out.line_if(moving_ && sums_, "    e->motion_doubt_before[i] = last->acceleration[i] * pfx_cube(before) / 12.0;");
+  out.line_if(moving_, "    e->motion_doubt[i] = pfx_moment(p, i);");
+  out.line_if(moving_ && sums_, "    e->motion_doubt_before[i] = pfx_moment(last, i);");
   out.line("  }}");
   out.line("  for (i = 0; i < PFX_CHANNELS; ++i) {{");
   out.line("    e->torque[i] = before * last->{}[i] + h * p->falling[i]{};", rising, curved ? " - curve[i]" : "");
@@ -948,11 +1191,13 @@ void FilterWriter::make_step(Text& out) const {
   out.line_if(viscous_, "    e->motion[i] = h * p->speed[i];");
   out.line_if(inertial_, "    e->slope[i] = s->speed[i] - s->speed_before[i];");
   if (moving_) {
-    out.line("    e->motion_doubt[i] = 0.0;");
-    out.line("    if (p->acceleration[i] > 0.0) {{");
+    const bool flows = flow_ != filter::FlowKind::none;
+    out.line("    e->motion_doubt[i] = {};", flows ? "p->bow[i] * h" : "HUGE_VAL");
+    out.line("    if (p->acceleration[i] < HUGE_VAL) {{");
     out.line("      const double most = 0.25 * p->acceleration[i], change = 0.125 * {};",
              mobile_ ? "pfx_change(p, i)" : "(2.0 * p->acceleration[i])");
-    out.line("      e->motion_doubt[i] = (change < most ? change : most) * h * h;");
+    out.line("      const double doubt = (change < most ? change : most) * h * h;");
+    out.line("      e->motion_doubt[i] = doubt < e->motion_doubt[i] ? doubt : e->motion_doubt[i];");
     out.line("    }}");
   }
   out.line("  }}");
@@ -971,8 +1216,14 @@ void FilterWriter::make_step(Text& out) const {
 }
 
 void FilterWriter::make(Text& out) const {
-  if ((linear_ && !mean_) || (moving_ && nodes_)) {
+  if (linear_ && !mean_) {
     out.put("\nstatic inline double pfx_cube(double x)\n{\n  return x * x * x;\n}\n");
+  }
+  if (moving_ && nodes_) {
+    out.put(
+        "\n/* First moment of a step's speed about its middle, at most. */\n"
+        "static inline double pfx_moment(const pfx_span *p, int c)\n{\n"
+        "  return p->departure[c] * p->length * p->length / 6.0;\n}\n");
   }
   make_unknown(out);
   curve(out);
@@ -1178,7 +1429,7 @@ void FilterWriter::filter(Text& out) const {
               "    s->memory.slope_before = (1.0 - exp(-PFX_SOFT * p->length)) / p->length;");
   if (first_doubt) {
     out.line("    for (i = 0; i < PFX_COORDINATES; ++i) {{");
-    out.line("      s->memory.first_doubt[i] = p->acceleration[i] * p->length * p->length / 12.0;");
+    out.line("      s->memory.first_doubt[i] = p->departure[i] * p->length / 6.0;");
     out.line("    }}");
   }
   out.line("  }}");

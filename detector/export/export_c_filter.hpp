@@ -59,7 +59,11 @@ class FilterWriter {
   void conversions(Text& out) const;
   void read(Text& out) const;
   void evaluate(Text& out) const;
+  void reach(Text& out) const;
   void solve(Text& out) const;
+  void by_dynamics(Text& out) const;
+  void find_moving(Text& out) const;
+  void follow_flow(Text& out) const;
   void enclose(Text& out) const;
   void describe(Text& out) const;
   void measure_effort(Text& out) const;
@@ -96,6 +100,10 @@ class FilterWriter {
   bool heading_ = false, measured_heading_ = false;
   // a function looks at joints
   bool joints_ = false;
+  // signs of speeds are looked at, and what bounds motion may tell that they do not change
+  bool sided_ = false;
+  // held efforts make a gradient flow of the motion
+  filter::FlowKind flow_ = filter::FlowKind::none;
   // there are terms of speeds, of accelerations
   bool viscous_ = false, inertial_ = false;
   // parabola through efforts; all efforts of a step; two halves of a step that differ

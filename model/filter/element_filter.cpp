@@ -21,6 +21,9 @@ void multiply_sizes(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eig
 
 double cube(double x) { return x * x * x; }
 
+// The most that ∫ (s − middle)(φ̇ − mean) ds is in a step of angles.
+double moment(const StepMotion& step, Eigen::Index c) { return step.departure[c] * step.length * step.length / 6.0; }
+
 std::size_t steps_within(double time, double nominal) {
   return time > 0.0 ? static_cast<std::size_t>(std::ceil(time / nominal)) + 1 : 0;
 }
@@ -165,6 +168,7 @@ void ElementFilter::sharpen(Sample& now, const Sample& before) {
 
 void ElementFilter::measure_motion(const Sample& now, const Sample& before) {
   StepMotion& step = present();
+  step.ends = measurement_.motion == MotionKind::speed;
   switch (measurement_.motion) {
     case MotionKind::angle:
       each(now.joint.size(),
@@ -172,7 +176,11 @@ void ElementFilter::measure_motion(const Sample& now, const Sample& before) {
       break;
     case MotionKind::mean_speed: step.joint_speed = now.joint; break;
     case MotionKind::speed:
-      each(now.joint.size(), [&](Eigen::Index j) { step.joint_speed[j] = 0.5 * (before.joint[j] + now.joint[j]); });
+      each(now.joint.size(), [&](Eigen::Index j) {
+        step.joint_speed[j] = 0.5 * (before.joint[j] + now.joint[j]);
+        scratch_[j] = now.joint[j] - before.joint[j];
+      });
+      multiply(model_.motion, scratch_, step.gain);
       break;
   }
   multiply(model_.motion, step.joint_speed, step.speed);
@@ -309,10 +317,12 @@ bool ElementFilter::measure_effort(std::size_t age) {
   }
   each(joints, [&](Eigen::Index j) { scratch_[j] = 0.5 * (high_[j] - low_[j]); });
   multiply_sizes(model_.input, scratch_, effort_change_);
-  Eigen::VectorXd& largest = present().effort;
+  StepMotion& step = present();
+  step.held = held && !between && !ranged_ && !mean && corrector_.empty() && !measurement_.effort_unsigned;
   each(e.doubt.size(), [&](Eigen::Index i) {
     e.doubt[i] = hull ? effort_change_[i] : e.doubt[i];
-    largest[i] = std::abs(e.falling[i] + e.rising[i]) + effort_change_[i] + errors_.motion.effort[i];
+    step.effort[i] = e.falling[i] + e.rising[i];
+    step.effort_error[i] = effort_change_[i] + errors_.motion.effort[i];
   });
   return effort_is_covered(mean ? now.t + 0.5 * present().length : now.t);
 }
@@ -340,10 +350,11 @@ bool ElementFilter::describe(std::size_t age) {
   }
   present().heading_error = errors_.heading;
   if (!present().known) {
-    present().acceleration.setZero();
+    present().departure.setZero();
     return true;
   }
-  return measure_effort(age) && enclosure_.enclose(model_, present());
+  const bool follows = instants_ > 0 && previous().known;
+  return measure_effort(age) && enclosure_.enclose(model_, present(), follows ? &previous() : nullptr);
 }
 
 // q − `corrected`, with `covered` in doubt, both times the curvature of a parabola through three efforts, `a` and `b`
@@ -399,8 +410,8 @@ void ElementFilter::make_hat() {
   each(element_.motion.size(), [&](Eigen::Index c) {
     element_.motion[c] = 0.5 * (before * first.speed[c] + h * last.speed[c]);
     element_.slope[c] = last.speed[c] - first.speed[c];
-    element_.motion_doubt[c] = last.acceleration[c] * cube(h) / 12.0;
-    element_.motion_doubt_before[c] = first.acceleration[c] * cube(before) / 12.0;
+    element_.motion_doubt[c] = moment(last, c);
+    element_.motion_doubt_before[c] = moment(first, c);
   });
   const StepEffort &rising = previous_effort(), &falling = present_effort();
   each(element_.torque.size(), [&](Eigen::Index i) {
@@ -440,11 +451,12 @@ void ElementFilter::make_step() {
     const auto i = static_cast<Eigen::Index>(c);
     element_.motion[i] = h * present().speed[i];
     element_.slope[i] = speed_[i] - speed_before_[i];
-    element_.motion_doubt[i] = 0.0;
-    if (present().acceleration[i] > 0.0) {
+    double doubt = present().bow[i] * h;
+    if (const double acceleration = present().acceleration[i]; acceleration < core::kInfinity) {
       const double change = enclosure_.change(c, model_, present(), effort_change_);
-      element_.motion_doubt[i] = std::min(0.25 * present().acceleration[i], 0.125 * change) * h * h;
+      doubt = std::min(doubt, std::min(0.25 * acceleration, 0.125 * change) * h * h);
     }
+    element_.motion_doubt[i] = doubt;
   }
   for (Eigen::Index i = 0; i < element_.torque.size(); ++i) {
     element_.torque[i] = h * (present_effort().falling[i] + present_effort().rising[i]) - curve_[i];
@@ -480,9 +492,9 @@ void ElementFilter::make_unknown() {
   }
   element_.run_begins = first.known;
   element_.run_ends = last.known;
-  each(element_.motion.size(), [&](Eigen::Index c) {  // accelerations of steps that are not known are 0
-    element_.motion_doubt[c] = last.acceleration[c] * cube(h) / 12.0;
-    element_.motion_doubt_before[c] = first.acceleration[c] * cube(length_before_) / 12.0;
+  each(element_.motion.size(), [&](Eigen::Index c) {  // departures in steps that are not known are 0
+    element_.motion_doubt[c] = moment(last, c);
+    element_.motion_doubt_before[c] = moment(first, c);
   });
 }
 

@@ -77,7 +77,7 @@ void RegressorFilter::begin() {
   slope_before_ = (1.0 - std::exp(-kernel_.lambda() * elements_.first_length())) / elements_.first_length();
   const double length = elements_.first_length();
   for (std::size_t c = 0; c < first_doubt_.size(); ++c) {
-    first_doubt_[c] = elements_.last_step().acceleration[static_cast<Eigen::Index>(c)] * length * length / 12.0;
+    first_doubt_[c] = elements_.last_step().departure[static_cast<Eigen::Index>(c)] * length / 6.0;
   }
 }
 
