@@ -11,6 +11,7 @@ namespace wheelwright::detector {
 namespace {
 
 constexpr double kBeyondEfforts = 3.0;  // efforts of a broken robot, in units of those that the rows can be due to
+constexpr double kFirst = 1.0 / 256.0;  // of most_effort
 
 std::size_t effort_reach(const Measurement& m, const filter::SignalErrors& errors) {
   if (!errors.between_samples) {
@@ -165,7 +166,13 @@ ReferenceMotion read_reference(LogSource& log, const RegressorFilter& filter) {
   }
   const core::RowMatrix growth = (wider.dY - any.dY).cwiseMax(0.0);
   const core::RowMatrix doubt = growth + (wider.Y - any.Y).cwiseAbs();
+  // What samples tell of the motion whatever the efforts are is a ceiling: it grows most at first.
+  more.motion.effort = apart.motion.effort.array() + kFirst * motion.most_effort;
+  const RegressionBlock first = walk_with(more);
   motion.effort_dY = growth / motion.most_effort;
+  if (known(first)) {
+    motion.effort_dY = motion.effort_dY.cwiseMax((first.dY - any.dY) / (kFirst * motion.most_effort));
+  }
   for (const Term& term : model.terms) {
     if (term.kind == Term::Kind::function) {
       for (auto k = static_cast<Eigen::Index>(term.output); k < doubt.rows();
