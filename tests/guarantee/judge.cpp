@@ -2,6 +2,7 @@
 #include "tests/guarantee/judge.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -56,7 +57,8 @@ void check_truth(const Scene& scene, const Commissioning& result, Verdict& verdi
 }
 
 // Width of the mass for rows without any error but the sensors' worst case, at the stamps of the log: exact filtered
-// motion, errors of the size of the kernels' L1 norms, nothing between samples.
+// motion, errors of the size of the kernels' L1 norms, nothing between samples. Dry friction of a joint at rest is any
+// number up to that of one in motion.
 double oracle_width(const Case& c, const Scene& scene, const Commissioning& result) {
   const double beta = result.model.filter.beta, alpha = result.model.filter.alpha, a2 = alpha * alpha;
   const bool axis = c.truth.axis;
@@ -71,20 +73,29 @@ double oracle_width(const Case& c, const Scene& scene, const Commissioning& resu
   const double mass = per * c.truth.mass, viscous = per * c.truth.viscous_linear;
 
   RegressionBlock block;
+  const Eigen::Index p = c.truth.coulomb > 0.0 ? 3 : 2;
   block.outputs = 1;
-  block.parameters = 2;
-  std::vector<double> rows;
-  double z1 = 0.0, z2 = 0.0;
+  block.parameters = static_cast<std::size_t>(p);
+  std::vector<double> rows, doubts;
+  std::array<double, 3> once{}, twice{};  // of the speed, the signs, what is not known of these
   std::size_t k = 0;
   for (std::size_t i = 1; i < scene.exact_t.size() && k < scene.learned.rows(); ++i) {
     const double h = scene.exact_t[i] - scene.exact_t[i - 1];
     const double decay = std::exp(-beta * h);
-    const double v = 0.5 * (scene.exact_speed[i] + scene.exact_speed[i - 1]);
-    z2 = decay * z2 + decay * h * z1 + v * (1.0 - decay - beta * h * decay) / (beta * beta);
-    z1 = decay * z1 + v * (1.0 - decay) / beta;
+    const auto middle = [i](const std::vector<double>& x) { return 0.5 * (x[i] + x[i - 1]); };
+    const double in[] = {middle(scene.exact_speed), middle(scene.exact_sign),
+                         middle(scene.exact_resting) + 0.5 * std::abs(scene.exact_sign[i] - scene.exact_sign[i - 1])};
+    for (std::size_t s = 0; s < 3; ++s) {
+      twice[s] = decay * twice[s] + decay * h * once[s] + in[s] * (1.0 - decay - beta * h * decay) / (beta * beta);
+      once[s] = decay * once[s] + in[s] * (1.0 - decay) / beta;
+    }
     if (scene.exact_t[i] >= scene.learned.t[k] - 0.25 * h) {
       if (speeds || beta * scene.learned.t[k] >= result.model.filter.settle) {
-        rows.insert(rows.end(), {a2 * (z1 - beta * z2), a2 * z2});
+        rows.insert(rows.end(), {a2 * (once[0] - beta * twice[0]), a2 * twice[0]});
+        if (p > 2) {
+          rows.push_back(a2 * twice[1]);
+          doubts.push_back(a2 * twice[2]);
+        }
         block.t.push_back(scene.learned.t[k]);
         block.sample.push_back(k);
       }
@@ -95,19 +106,29 @@ double oracle_width(const Case& c, const Scene& scene, const Commissioning& resu
     return 0.0;
   }
   const auto n = static_cast<Eigen::Index>(block.t.size());
-  block.Y = Eigen::Map<const core::RowMatrix>(rows.data(), n, 2);
-  block.dY.resize(n, 2);
+  block.Y = Eigen::Map<const core::RowMatrix>(rows.data(), n, p);
+  block.dY.resize(n, p);
   block.dY.col(0).setConstant(n_acceleration);
   block.dY.col(1).setConstant(n_speed);
-  block.y = block.Y * Eigen::Vector2d(mass, viscous);
+  Eigen::VectorXd theta(p);
+  theta.head(2) << mass, viscous;
+  if (p > 2) {
+    block.dY.col(2) = Eigen::Map<const Eigen::VectorXd>(doubts.data(), n);
+    theta[2] = c.truth.coulomb;
+  }
+  block.y = block.Y * theta;
   block.dy = Eigen::VectorXd::Constant(n, n_effort);
   Box prior;
-  for (const char* physical : {axis ? "inertia" : "mass", axis ? "viscous" : "viscous_linear"}) {
+  for (const char* physical : {axis ? "inertia" : "mass", axis ? "viscous" : "viscous_linear", "coulomb"}) {
     for (std::size_t j = 0; j < result.parameters.size(); ++j) {
       if (result.parameters[j].parameter.physical == physical) prior.sides.push_back(result.prior.sides[j]);
     }
   }
   core::RegressionTable table(std::move(block));
+  if (prior.dimension() < static_cast<std::size_t>(p)) {
+    return 0.0;  // the model knows no dry friction
+  }
+  prior.sides.resize(static_cast<std::size_t>(p));
   const FeasibleSet set = feasible_set(table, prior);
   return set.status == FeasibleSet::Status::nonempty ? (set.hull.sides[0].upper - set.hull.sides[0].lower) / mass : 0.0;
 }
@@ -252,7 +273,7 @@ Verdict judge(const Case& c, const JudgeOptions& options) {
     if (options.faults && whole && c.broken == Broken::none && verdict.end == Verdict::End::guaranteed) {
       try_faults(c, result.model, verdict);
     }
-    if (options.oracle && c.truth.coulomb == 0.0 && result.model.filter.order == 2) {
+    if (options.oracle && result.model.filter.order == 2) {
       verdict.oracle = oracle_width(c, scene, result);
     }
   } catch (const std::exception& e) {

@@ -282,6 +282,13 @@ LogTable record(const Case& c, const Order& order, Noise noise, std::size_t rows
     extra.exact->exact_t = fine_knots(all);
     for (const Pair& v : drive(c.truth, asked, ticks, extra.exact->exact_t).speed) {
       extra.exact->exact_speed.push_back(joints == 1 ? v[0] : 0.5 * c.truth.radius * (v[0] + v[1]));
+      double sign = 0.0, resting = 0.0;
+      for (std::size_t j = 0; j < joints; ++j) {
+        sign += double(v[j] > 0.0) - double(v[j] < 0.0);
+        resting += v[j] == 0.0 ? 1.0 : 0.0;
+      }
+      extra.exact->exact_sign.push_back(sign);
+      extra.exact->exact_resting.push_back(resting);
     }
   }
   if (c.changes == Changes::smooth) {

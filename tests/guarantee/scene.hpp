@@ -105,6 +105,8 @@ struct Scene {
   std::map<std::string, double> truth;  ///< physical parameter -> value
   std::vector<double> exact_t;          ///< many instants of the learning drive in every step, s
   std::vector<double> exact_speed;      ///< true speed there: of the body (two wheels, m/s) or of the axis
+  std::vector<double> exact_sign;       ///< sum of the signs of the joints' true speeds there
+  std::vector<double> exact_resting;    ///< number of joints that stand still there
 };
 
 /// Plays `c`; `exact`: with the exact speeds.
