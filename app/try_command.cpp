@@ -228,6 +228,12 @@ void settle_from_log(const Arguments& a, RobotWithOrigins& made) {
           fmt::format("{:g} to {:g} s: {}", delay->taken->lower, delay->taken->upper, delay->sentence);
     }
   }
+  const auto smoothed =
+      std::ranges::find_if(health.findings, [](const doctor::LogFinding& f) { return f.effort_smoothing.has_value(); });
+  if (smoothed != health.findings.end() && (smoothed->id != "time.effort_delay" || robot.effort_delay != Interval{})) {
+    robot.effort_smoothing = *smoothed->effort_smoothing;
+    made.origins["effort.smoothing"] = smoothed->sentence;
+  }
   if (health.clock) {
     robot.clock = health.clock;
     made.origins["clock"] = health.find("time.even_clock")->sentence;
@@ -370,7 +376,7 @@ int run(const Arguments& given) {
     robot = made.robot;
     yaml = robots::robot_yaml(made) + robots::columns_yaml(a.common.columns);
     for (const char* key : {"wheel_radius", "track_width", "nominal.mass", "effort.kind", "effort.hold", "effort.delay",
-                            "clock", "encoder_counts_per_turn"}) {
+                            "effort.smoothing", "clock", "encoder_counts_per_turn"}) {
       if (const auto origin = made.origins.find(key);
           origin != made.origins.end() &&
           (std::string_view(key) != "effort.delay" || robot.effort_delay != Interval{})) {

@@ -226,23 +226,40 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
   return what + "; " + declare;
 }
 
+// What a robot file says of the time of its efforts.
+std::string effort_declaration(const Robot& robot) {
+  std::vector<std::string> keys;
+  const auto add = [&](const char* key, const Interval& range) {
+    if (range != Interval{}) {
+      keys.push_back(fmt::format("{}: [{:g}, {:g}]", key, range.lower, range.upper));
+    }
+  };
+  add("delay", robot.effort_delay);
+  add("smoothing", robot.effort_smoothing);
+  return fmt::format("`effort: {{{}}}`", fmt::join(keys, ", "));
+}
+
 void find_latency(LogSource& log, const Setting& s, const Fit& fit, const std::optional<EffortTiming>& timing,
                   std::vector<LogContradiction>& out) {
   if (s.robot.effort_delay_found) {
-    const Interval taken = s.robot.effort_delay;
+    const Interval taken = s.robot.effort_delay, smoothed = s.robot.effort_smoothing;
+    const bool late = taken != Interval{};
     out.push_back(
         {.kind = Kind::effort_timing,
          .withdraws = false,
          .demotes = true,
          .subject = s.measurement.effort_columns.front(),
-         .value = taken.upper,
+         .value = late ? taken.upper : smoothed.upper,
          .limit = 0.0,
-         .sentence = fmt::format("the efforts come after the motion, which nobody declares: a delay of {:g} to {:g} "
-                                 "ms is taken in",
-                                 1e3 * taken.lower, 1e3 * taken.upper),
-         .next = fmt::format("where it is known to lie there, `effort: {{delay: [{:g}, {:g}]}}` in the robot "
-                             "file declares it; stamp efforts and motion by one clock for narrower bounds",
-                             taken.lower, taken.upper)});
+         .sentence = fmt::format(
+             "the efforts come after the motion, which nobody declares:{}{}",
+             !late ? "" : fmt::format(" a delay of {:g} to {:g} ms is taken in", 1e3 * taken.lower, 1e3 * taken.upper),
+             smoothed == Interval{} ? ""
+                                    : fmt::format("{} a low-pass filter of {:g} to {:g} ms is undone",
+                                                  late ? ", and" : "", 1e3 * smoothed.lower, 1e3 * smoothed.upper)),
+         .next = fmt::format("where that is known, {} in the robot file declares it; {} for narrower bounds",
+                             effort_declaration(s.robot),
+                             late ? "stamp efforts and motion by one clock" : "log efforts that are not smoothed")});
   }
   if (!timing || !is_latency(*timing, s.survey.median_step)) {
     return;

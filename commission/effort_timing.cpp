@@ -8,7 +8,6 @@
 #include <Eigen/QR>
 
 #include "commission/contradiction_search.hpp"
-#include "commission/effort_smoothing.hpp"
 #include "commission/evidence.hpp"
 #include "commission/fit.hpp"
 #include "commission/setting.hpp"
@@ -117,6 +116,10 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     }
     EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
     timing.allowed = declared;
+    const Interval sharpening = s.measurement.sharpening();  // its middle is taken
+    const double open = 0.5 * s.survey.median_step * (sharpening.upper - sharpening.lower);
+    timing.allowed.lower -= open;
+    timing.allowed.upper += open;
     const bool held = s.measurement.hold == Hold::zero_order;
     const bool ranged = timing.allowed.lower != 0.0 || timing.allowed.upper != 0.0;
     // As the rows' own hull: a value may come into force up to a step before its stamp; a measured one lies between
@@ -150,27 +153,6 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     return timing;
   } catch (const InvalidArgument&) {
     return std::nullopt;  // segments shorter than the longest shift
-  }
-}
-
-std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s, const Fit& fit, double longest,
-                                                std::size_t most_rows) {
-  const std::optional<RegressionBlock> rows = rows_as_logged(log, s, most_rows);
-  if (!rows) {
-    return std::nullopt;
-  }
-  try {
-    const identify::TimeShiftedRows model(*rows, identify::TimeEffect::effort_lag, 0.0, longest);
-    identify::VariableProjectionOptions options = model.options();
-    options.weights = fit.weights;
-    const identify::SeparableFit found = identify::variable_projection(model, options);
-    if (found.end != identify::SearchEnd::converged || found.state[0] != identify::ShapeState::identified) {
-      return std::nullopt;
-    }
-    return EffortSmoothing{.time_constant = found.shape[0],
-                           .error = 2.0 * found.standard_error[0] + 0.5 * s.survey.median_step};
-  } catch (const InvalidArgument&) {
-    return std::nullopt;  // segments shorter than six of the longest filter
   }
 }
 

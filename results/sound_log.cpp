@@ -84,11 +84,14 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
     }
     out.log = std::move(reopened);
   }
-  if (const doctor::LogFinding* late = health.find("time.effort_delay");
-      late != nullptr && late->taken && pose == WheelPose::judged) {
-    out.robot.effort_delay = *late->taken;
-    out.robot.effort_delay_found = true;
-    out.remarks.push_back(late->sentence);
+  for (const doctor::LogFinding& finding : health.findings) {
+    const bool late = finding.id == "time.effort_delay" && finding.taken;
+    if (pose == WheelPose::judged && (late || finding.effort_smoothing)) {
+      out.robot.effort_delay = late ? *finding.taken : out.robot.effort_delay;
+      out.robot.effort_smoothing = finding.effort_smoothing.value_or(out.robot.effort_smoothing);
+      out.robot.effort_delay_found = true;
+      out.remarks.push_back(finding.sentence);
+    }
   }
   if (health.clock) {
     out.log = logs::read_evenly(std::move(out.log), *health.clock);

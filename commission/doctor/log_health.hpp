@@ -57,6 +57,7 @@ struct LogFinding {
   bool hides = false;  ///< no command reads its columns, and the rest was examined without them
   std::optional<model::SpeedFilter> speed_filter{};  ///< with which every command reads the log
   std::optional<model::SpeedCut> speed_cut{};        ///< likewise
+  std::optional<Interval> effort_smoothing{};        ///< likewise, s: Robot::effort_smoothing
 
   /// True if commands that make something of a log refuse it for this (results/sound_log.hpp).
   [[nodiscard]] bool is_refusal() const {

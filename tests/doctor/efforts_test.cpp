@@ -267,5 +267,31 @@ TEST(Efforts, ThatAreSmoothedAreToldWithTheTimeConstant) {
   }
 }
 
+// Held commands that act from stamp to stamp are late by less than a step only where they are smoothed.
+TEST(Efforts, ThatAreSmoothedALittleAreReadWithTheFilterTheyAreOf) {
+  for (const double rate : {50.0, 100.0, 250.0}) {
+    const LogTable sound = drive({.rate = rate, .seed = 7});
+    EXPECT_EQ(examine(sound, robot_of()).find("signals.effort_filter"), nullptr);
+    for (const double steps : {0.6, 0.9}) {
+      LogTable smoothed = sound;
+      const double a = 1.0 - std::exp(-1.0 / steps), tau = steps / rate;
+      for (const std::size_t c : {2U, 3U}) {
+        double y = 0.0;
+        for (double& u : smoothed.columns[c]) {
+          u = y += a * (u - y);
+        }
+      }
+      const LogHealth health = examine(smoothed, robot_of());
+      const LogFinding* found = health.find("signals.effort_filter");
+      ASSERT_NE(found, nullptr) << rate << " Hz, " << steps << " steps";
+      ASSERT_TRUE(found->effort_smoothing);
+      EXPECT_LE(found->effort_smoothing->lower, tau) << found->sentence;
+      EXPECT_GE(found->effort_smoothing->upper, tau) << found->sentence;
+      EXPECT_LT(found->effort_smoothing->width(), tau) << found->sentence;
+      EXPECT_EQ(refusals(health), "");
+    }
+  }
+}
+
 }  // namespace
 }  // namespace wheelwright::doctor::efforts_test
