@@ -184,21 +184,25 @@ bool rougher_than_counts(const std::vector<Kept>& segments, const Eigen::Vector2
   return heading > kOfTheRounding * wheels;
 }
 
-// Whether the heading bends more than lines between samples of what the wheels do near by, `between` rows apart, and
-// `counts` (rad) can: as noise of its own does, at rest above all.
-bool bends_by_itself(const std::vector<Kept>& segments, const Eigen::Vector2d& weights, double between, double counts) {
+// Whether the heading bends more than lines between samples of what the wheels do near by, `between` rows apart, can:
+// with their `counts` (rad) where they turn, as rounded to `quantum` where they stand.
+bool bends_by_itself(const std::vector<Kept>& segments, const Eigen::Vector2d& weights, double between, double counts,
+                     double quantum) {
   const auto around = static_cast<std::size_t>(std::ceil(between)) + 1;
   std::size_t rows = 0, own = 0;
   for (const Kept& log : segments) {
-    std::vector<double> wheels(log.rows(), 0.0);
-    for (std::size_t k = 1; k + 1 < log.rows(); ++k) {
-      wheels[k] =
-          std::abs(weights[0]) * Kept::bend(log.wheel[0], k) + std::abs(weights[1]) * Kept::bend(log.wheel[1], k);
-    }
     for (std::size_t k = around + 1; k + around + 1 < log.rows(); ++k) {
-      const auto from = wheels.begin() + static_cast<std::ptrdiff_t>(k - around);
-      const double most = *std::max_element(from, from + static_cast<std::ptrdiff_t>(2 * around + 1));
-      own += Kept::bend(log.heading, k) > (between + 1.0) * most + counts ? 1 : 0;
+      double most = 0.0;
+      bool turns = false;
+      for (std::size_t i = k - around; i <= k + around; ++i) {
+        double bend = 0.0;
+        for (std::size_t j = 0; j < 2; ++j) {
+          bend += std::abs(weights[static_cast<Eigen::Index>(j)]) * Kept::bend(log.wheel[j], i);
+          turns = turns || log.wheel[j][i + 1] != log.wheel[j][i - 1];
+        }
+        most = std::max(most, bend);
+      }
+      own += Kept::bend(log.heading, k) > (between + 1.0) * most + (turns ? counts : 0.0) + 2.0 * quantum ? 1 : 0;
       ++rows;
     }
   }
@@ -268,7 +272,7 @@ std::optional<WithinLines> within_interpolation(const std::vector<Kept>& segment
     expected += 0.5 * by_lines * by_lines + 5.0 / 18.0 * count * count * c.squaredNorm();
   }
   if (squares > kOfTheRounding * expected || (by_counts > 0.0 && rougher_than_counts(segments, c, quantum)) ||
-      bends_by_itself(segments, c, between, 2.0 * (by_counts + quantum))) {
+      bends_by_itself(segments, c, between, by_counts, quantum)) {
     return std::nullopt;
   }
   return WithinLines{windows.rest().value_or(0.0), close >= kFewestDrives};
