@@ -42,9 +42,10 @@ std::int64_t common_origin(const TimeOrigin& origin, std::int64_t second) {
 double WheelAngle::follow(double time, double angle, bool predict) {
   constexpr double slack = 1e-3;
   constexpr double most_change = 100.0;  // rad/s
+  constexpr double longest_lead = 10.0;  // times the last step
   const double step = angle - before_, seconds = time - time_;
   keep(time, angle);
-  const bool known = predict && std::isfinite(rate_);
+  const bool known = predict && std::isfinite(rate_) && seconds <= longest_lead * span_;
   const double expected = known ? rate_ * seconds : 0.0;
   double turns = -std::round(step / turn_);
   if (!wrapped_) {
@@ -67,7 +68,10 @@ double WheelAngle::follow(double time, double angle, bool predict) {
   const double moved = std::abs(step + turns * turn_);
   count_ = moved > 1e-9 && !broken_ ? std::min(count_, moved) : count_;
   turns_ += turns;
-  rate_ = (step + turns * turn_) / seconds;
+  if (longest_lead * seconds >= span_) {
+    rate_ = (step + turns * turn_) / seconds;
+    span_ = seconds;
+  }
   return value();
 }
 
@@ -99,6 +103,7 @@ double WheelAngle::value() const { return before_ + turns_ * turn_; }
 double WheelAngle::begin(double time, double angle) {
   keep(time, angle);
   rate_ = std::numeric_limits<double>::quiet_NaN();
+  span_ = 0.0;
   turns_ = 0.0;
   jumped_ = broken_ = false;
   return angle;

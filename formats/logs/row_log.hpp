@@ -39,7 +39,8 @@ enum class RowOutcome {
 /// explains: by more than half a turn, while all values so far lie within one turn, and with the turn taken away within
 /// a quarter of a turn of where the last step leads. From then on every step is the one that is closest to the
 /// last, per second, or the shortest where none of them is within a quarter of a turn of it. The same for the range of
-/// a counter, some turns or 2^16 or 2^32 counts of which a whole number make a turn, from its second jump on.
+/// a counter, some turns or 2^16 or 2^32 counts of which a whole number make a turn, from its second jump on. Of
+/// rows that were sent together only the first leads anywhere: a tenth of the time of the step before is too little.
 class WheelAngle {
  public:
   /// `angle` (rad) at `time` (s), later than the last one, with the turns that were undone. `predict` is false where so
@@ -69,6 +70,7 @@ class WheelAngle {
   double count_ = std::numeric_limits<double>::infinity();  // rad, the smallest step
   double least_ = std::numeric_limits<double>::infinity(), most_ = -least_;
   double rate_ = std::numeric_limits<double>::quiet_NaN();  // of the last step, rad/s
+  double span_ = 0.0;                                       // of it, s
   bool wrapped_ = false, jumped_ = false, broken_ = false;
 };
 

@@ -854,12 +854,14 @@ TEST_F(LogFile, RowsThatLeapAreLeftOutAndCountedOnRequest) {
 // Bursts of rows are no gaps, wherever the row of a burst comes.
 TEST_F(LogFile, BurstsOfRowsAreOneSegment) {
   for (const int burst : {3, 5}) {
-    std::string text = "t,omega_r,omega_l\n";
+    std::string text = "t,phi_r,phi_l\n";
     for (int k = 0; k < 400; ++k) {
-      text += fmt::format("{:.6f},1,1\n", 0.1 * (k / burst * burst + burst) + 0.001 * (k % burst));
+      text += fmt::format("{:.6f},{:.3f},{:.3f}\n", 0.1 * (k / burst * burst + burst) + 0.001 * (k % burst), 0.8 * k,
+                          40.0 * std::sin(0.01 * k));
     }
     const auto log = open_log({put("bursts.csv", text)});
     EXPECT_EQ(log->report().segments, 1U) << burst;
+    EXPECT_EQ(log->report().jumps.count + log->report().angle_wraps.count, 0U) << burst;
     EXPECT_EQ(log->report().rows, 400U);
   }
 }
