@@ -216,10 +216,12 @@ Assumption assumed_geometry(const Commissioning& r) {
     a.detail = "pose or gyro do not show all radii and yaw gains";
     return a;
   }
+  bool far = false;  // by more than the width of an interval, which no learnt bound makes doubtful
   for (const KinematicParameter& p : k.parameters) {
     if (p.name != "gyro_bias" && !(p.lower <= p.nominal && p.nominal <= p.upper)) {
       a.detail += fmt::format("{}{} in [{:.5g}, {:.5g}], {:.5g} in the robot file", a.detail.empty() ? "" : "; ",
                               p.name, p.lower, p.upper, p.nominal);
+      far = far || std::max(p.lower - p.nominal, p.nominal - p.upper) > p.upper - p.lower;
     }
   }
   const bool bounds_learnt = std::ranges::any_of(k.noise, learnt);
@@ -234,9 +236,9 @@ Assumption assumed_geometry(const Commissioning& r) {
     a.verdict = open <= kToldLength ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
     return a;
   }
-  a.verdict = a.detail.empty() ? AssumptionVerdict::holds
-              : bounds_learnt  ? AssumptionVerdict::not_tested
-                               : AssumptionVerdict::fails;
+  a.verdict = a.detail.empty()        ? AssumptionVerdict::holds
+              : bounds_learnt && !far ? AssumptionVerdict::not_tested
+                                      : AssumptionVerdict::fails;
   if (bounds_learnt) {
     a.detail += a.detail.empty() ? "against bounds learnt from the log" : ": against bounds learnt from the log";
   }
