@@ -239,6 +239,9 @@ Assumption assumed_geometry(const Commissioning& r) {
   a.verdict = a.detail.empty()        ? AssumptionVerdict::holds
               : bounds_learnt && !far ? AssumptionVerdict::not_tested
                                       : AssumptionVerdict::fails;
+  if (a.verdict == AssumptionVerdict::fails) {
+    a.detail += "; so the radius of a wheel or the track width is another";
+  }
   if (bounds_learnt) {
     a.detail += a.detail.empty() ? "against bounds learnt from the log" : ": against bounds learnt from the log";
   }
