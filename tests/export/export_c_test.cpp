@@ -407,18 +407,19 @@ TEST_F(ExportC, StartsAnewAfterAStepThatIsTooLong) {
          .between = Between::mobility,
          .nominal = 0.0,
          .gap = 1.5};
-  const auto expect_loss = [&](Case longer, const std::string& what) {
+  const auto lost = [&](Case longer, const std::string& what) {
     expect_same(longer, what);
     const std::size_t valid = same(longer, 1, 2500).valid;
     longer.gap = 0.3;
-    EXPECT_LT(valid, same(longer, 1, 2500).valid) << what;
+    return same(longer, 1, 2500).valid - valid;
   };
-  expect_loss(c, "speeds");
+  EXPECT_GT(lost(c, "speeds"), 0u);
+  // The mean speed between two angles bounds what friction makes of it in a step of any length.
   c.model = model::SingleAxis{}.model();
   c.motion = MotionKind::angle;
   c.design = {};
   c.noisy = false;
-  expect_loss(c, "angles");
+  EXPECT_EQ(lost(c, "angles"), 0u);
 }
 
 TEST_F(ExportC, TakesWhatIsNoNumberForLost) {
