@@ -86,6 +86,7 @@ std::string line_of(std::uint64_t number, const Options& options) {
   line["violation"] = v.violation(c.broken == Broken::none);
   line["outside"] = v.outside;
   line["facet_cuts"] = v.facet_cuts;
+  line["failing"] = v.failing;
   line["width"] = v.width;
   line["oracle"] = v.oracle;
   line["rows"] = v.rows;

@@ -265,6 +265,11 @@ Verdict judge(const Case& c, const JudgeOptions& options) {
     verdict.end = result.model.warrant == core::Warrant::guaranteed                   ? Verdict::End::guaranteed
                   : commission::interval_warrant(result) == core::Warrant::guaranteed ? Verdict::End::intervals
                                                                                       : Verdict::End::learnt;
+    for (const core::Assumption& assumption : result.assumptions) {
+      if (assumption.verdict == core::AssumptionVerdict::fails) {
+        verdict.failing += (verdict.failing.empty() ? "" : " ") + assumption.id;
+      }
+    }
     check_truth(scene, result, verdict);
     const auto watching = std::chrono::steady_clock::now();
     watch(scene.watched, result.model, verdict);

@@ -31,6 +31,7 @@ struct Verdict {
   };
   End end = End::refused;
   std::string message;                 ///< of the library
+  std::string failing;                 ///< assumptions that its tests say no to, by id, one space between
   std::string outside;                 ///< parameters whose true value is not in [lower, upper]
   bool facet_cuts = false;             ///< a facet of the set leaves the truth out
   double width = 0.0;                  ///< upper − lower of the mass (axis: inertia) over the true value
