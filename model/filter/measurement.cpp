@@ -77,7 +77,8 @@ SpeedSample sample_speeds(LogSource& log, const std::vector<std::string>& column
     }
     for (std::size_t k = 1; k < block.rows(); ++k) {
       ++steps;
-      uneven += std::abs(block.t[k] - block.t[k - 1] - nominal) > kEvenSteps * nominal ? 1 : 0;
+      const double steps_on = (block.t[k] - block.t[k - 1]) / nominal;  // 2 where a row is lost
+      uneven += std::abs(steps_on - std::max(1.0, std::round(steps_on))) > kEvenSteps ? 1 : 0;
     }
   }
   log.rewind();

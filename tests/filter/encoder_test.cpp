@@ -145,6 +145,35 @@ TEST(FindEncoder, AQuantumThatIsFoundReplacesNoDeclaredBound) {
   EXPECT_EQ(found().motion, MotionKind::mean_speed);
 }
 
+// A row that is lost leaves the counts of the others what they are.
+TEST(FindEncoder, LostRowsAreNoUnevenSampling) {
+  const auto motion = [](auto time_of) {
+    LogTable log;
+    log.names = {"omega_r", "omega_l", "tau_r", "tau_l"};
+    log.columns.resize(4);
+    const auto speeds = differenced(4096.0, 0.01, 8.0, 9);
+    for (std::size_t k = 0; k < speeds.size(); ++k) {
+      if (const double t = time_of(k); t >= 0.0) {
+        log.t.push_back(t);
+        for (auto& column : log.columns) {
+          column.push_back(speeds[k]);
+        }
+      }
+    }
+    TableSource source(log);
+    Robot robot;
+    robot.wheel_radius = 0.1;
+    robot.track_width = 0.4;
+    robot.encoder_counts_per_turn = 4096.0;
+    return find_measurement(source, robot, model::make_model(robot), 2).motion;
+  };
+  const auto at = [](std::size_t k) { return 0.01 * static_cast<double>(k); };
+  EXPECT_EQ(motion([&](std::size_t k) { return k % 40 == 7 ? -1.0 : at(k); }), MotionKind::mean_speed);
+  EXPECT_EQ(motion([&](std::size_t k) { return k % 40 == 7 || k % 90 == 8 || k % 90 == 9 ? -1.0 : at(k); }),
+            MotionKind::mean_speed);
+  EXPECT_EQ(motion([&](std::size_t k) { return at(k) + (k % 40 == 7 ? 0.004 : 0.0); }), MotionKind::speed);
+}
+
 TEST(FindEncoder, SmoothSpeedsAreNoEncoder) {
   std::vector<double> speeds;
   for (int k = 0; k < 3000; ++k) {
