@@ -18,6 +18,7 @@
 #include "commission/evidence.hpp"
 #include "commission/fit.hpp"
 #include "commission/noise_budget.hpp"
+#include "commission/premises.hpp"
 #include "commission/setting.hpp"
 #include "commission/setting_rows.hpp"
 #include "commission/two_walks.hpp"
@@ -829,7 +830,8 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   weigh_efforts(log, s, result.row_errors, result.feasible.hull, result.contradictions);
   if (wants_weighing(result, s)) {
     weigh_contradictions(result, s, fit, learnt.signals.timing,
-                         explained_by_errors(log, s, fit, result.row_errors, result.feasible.hull));
+                         explained_by_errors(log, s, fit, result.row_errors, result.feasible.hull),
+                         errors_average(log, s, fit));
   }
   if (withdrawn(result)) {
     withdraw(result);

@@ -312,7 +312,7 @@ void find_wrong_signs(const Setting& s, const Fit& fit, std::vector<LogContradic
 }
 
 // Least squares with dry friction in a model that has none.
-void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradiction>& out) {
+void find_dry_friction(LogSource& log, const Setting& s, const Fit& fitted, std::vector<LogContradiction>& out) {
   if (!s.noise_complete || s.measurement.effort_unsigned) {
     return;
   }
@@ -334,7 +334,18 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
   log.rewind();
   const identify::ResidualSummary summary = statistics.summary(fit.inverse_gram);
   const double estimate = fit.estimate[at], error = summary.standard_error[at];
-  if (!(estimate > certain(summary.freedom) * error)) {
+  double limit = certain(summary.freedom) * error;
+  if (estimate > limit && !errors_average(log, s, fitted)) {
+    Fit widened;
+    widened.weights = weights;
+    widened.excitation.resize(wide.model.p());
+    Box point;
+    for (const double theta : fit.estimate) {
+      point.sides.push_back({theta, theta});
+    }
+    limit += explained_by_errors(log, wide, widened, errors_of_fit(wide), point).noise[at];
+  }
+  if (!(estimate > limit)) {
     return;
   }
   const InWords w = in_words(wide, static_cast<std::size_t>(at));
@@ -344,7 +355,7 @@ void find_dry_friction(LogSource& log, const Setting& s, std::vector<LogContradi
        .demotes = true,
        .subject = "coulomb",
        .value = w.value(estimate),
-       .limit = w.value(certain(summary.freedom) * error),
+       .limit = w.value(limit),
        .sentence = fmt::format("the efforts follow the sign of the motion as by dry friction of {:.3g} ± {:.2g} "
                                "{}, which the model does not have",
                                w.value(estimate), 2.0 * std::abs(w.scale) * error, w.unit),
@@ -372,7 +383,7 @@ SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit
     findings.timing = effort_timing(log, s, fit);
     find_latency(log, s, fit, findings.timing, found);
     find_wrong_signs(s, fit, found);
-    find_dry_friction(log, s, found);
+    find_dry_friction(log, s, fit, found);
     find_uneven_efforts(s, joints, found);
     findings.premises = test_premises(log, s, fit, found);
   }
@@ -473,7 +484,7 @@ bool wants_weighing(const Commissioning& result, const Setting& s) {
 }
 
 void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fit,
-                          const std::optional<EffortTiming>& timing, const Explained& explained) {
+                          const std::optional<EffortTiming>& timing, const Explained& explained, bool errors_average) {
   const auto weigh = [](LogContradiction& c, double size, double chance, double doubt, double noise) {
     c.withdraws = size > chance + doubt + noise;
     c.demotes = !c.withdraws && size > chance + doubt;
@@ -493,6 +504,7 @@ void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fi
       const auto at = static_cast<Eigen::Index>(reach->parameter);
       weigh(c, reach->size, certain(result.residuals.freedom) * *result.parameters[reach->parameter].standard_error,
             explained.in_doubt[at], explained.noise[at]);
+      c.demotes = c.demotes && errors_average;
     }
   }
   std::erase_if(result.contradictions,

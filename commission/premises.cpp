@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -15,11 +16,14 @@
 #include "commission/contradiction_search.hpp"
 #include "commission/fit.hpp"
 #include "commission/keep_instants.hpp"
+#include "commission/noise_budget.hpp"
 #include "commission/physical.hpp"
 #include "commission/setting_rows.hpp"
+#include "core/limits.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
 #include "identify/moments.hpp"
+#include "model/filter/noise.hpp"
 #include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
@@ -32,6 +36,7 @@ using Indices = std::vector<Eigen::Index>;
 
 constexpr std::size_t kBlocksOfMoments = 512;
 constexpr double kLongEnoughForThirds = 60.0;  // s
+constexpr double kFewestInPart = 60.0;         // instants, from which on a part is fitted
 constexpr double kMotionShare = 0.5;           // of a direction's Σ YᵀY that must be more than noise
 constexpr double kAlwaysShows = 2.0;           // standard errors beyond a limit
 constexpr double kPartOfParameter = 0.1, kPartOfEffort = 0.02;
@@ -59,6 +64,11 @@ struct Widened {
   Setting setting;
   Indices model, offsets, shapes, dry;
 };
+
+Indices joined(Indices a, const Indices& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
 
 bool has_constant(const Model& model) {
   return std::ranges::any_of(model.terms,
@@ -118,21 +128,20 @@ Widened widened_for_premises(const Setting& s, const Fit& fit) {
   return w;
 }
 
+// Whether noise leaves little of the dry friction of instant `k` open, in each output.
+bool signs_are_known(const Widened& w, const RegressionBlock& block, std::size_t k) {
+  const auto n = static_cast<Eigen::Index>(block.outputs), first = static_cast<Eigen::Index>(k) * n;
+  return std::ranges::none_of(w.dry, [&](Eigen::Index j) {
+    return (block.dY.col(j).segment(first, n).array() > kOpenSign * block.Y.col(j).segment(first, n).array().abs())
+        .any();
+  });
+}
+
 RegressionMoments premise_moments(LogSource& log, const Widened& w) {
   TorqueRows rows = make_rows(log, w.setting, errors_of_fit(w.setting));
   RegressionMoments moments(rows.outputs(), rows.parameters(), false, kBlocksOfMoments);
   core::for_each_block(rows, [&](RegressionBlock& block) {
-    const auto n = static_cast<Eigen::Index>(block.outputs);
-    keep_instants(block, [&](std::size_t k) {
-      for (const Eigen::Index j : w.dry) {
-        for (Eigen::Index row = static_cast<Eigen::Index>(k) * n; row < static_cast<Eigen::Index>(k + 1) * n; ++row) {
-          if (block.dY(row, j) > kOpenSign * std::abs(block.Y(row, j))) {
-            return false;
-          }
-        }
-      }
-      return true;
-    });
+    keep_instants(block, [&](std::size_t k) { return signs_are_known(w, block, k); });
     moments.add(block);
   });
   log.rewind();
@@ -158,6 +167,7 @@ struct PartFit {
   Eigen::VectorXd error;      // standard errors
   Eigen::VectorXd freedom;    // of their Student's t
   Eigen::MatrixXd by_offset;  // kept × joints: what a unit of each joint's offset makes of θ
+  Eigen::MatrixXd inverse;    // kept × kept: what the rows' Σ Yᵀy makes of θ
 };
 
 // Moments in weighted units, with what noise adds to them.
@@ -180,6 +190,9 @@ class PremiseMoments {
 
   [[nodiscard]] std::size_t blocks() const { return blocks_.size(); }
   [[nodiscard]] double begin_of(std::size_t block) const { return begins_[block]; }
+  [[nodiscard]] bool holds(const BlockRange& range, double t) const {
+    return range.first < blocks() && t >= begins_[range.first] && (range.last >= blocks() || t < begins_[range.last]);
+  }
   [[nodiscard]] double instants(std::size_t first, std::size_t last) const {
     double sum = 0.0;
     for (std::size_t b = first; b < last; ++b) {
@@ -217,6 +230,8 @@ class PremiseMoments {
   }
 
   [[nodiscard]] PartFit fit(const BlockRange& range, const Indices& kept, const Indices& offsets) const;
+  // All columns, zero those that are not kept; what the rows leave open is as small as can be.
+  [[nodiscard]] Eigen::VectorXd least_squares(std::size_t first, std::size_t last, const Indices& kept) const;
   // Residuals are alike over `alike` instants.
   [[nodiscard]] ChangePlace change(const Indices& kept, double alike) const;
 
@@ -231,7 +246,7 @@ PartFit PremiseMoments::fit(const BlockRange& range, const Indices& kept, const 
   const MomentSums total = sums(range.first, range.last);
   const double n = instants(range.first, range.last);
   const Eigen::MatrixXd whole = total.YY(kept, kept), noise = noise_(kept, kept);
-  if (kept.empty() || n < static_cast<double>(kFewestInstants) || !(whole.diagonal().minCoeff() > 0.0)) {
+  if (kept.empty() || n < kFewestInPart || !(whole.diagonal().minCoeff() > 0.0)) {
     return part;
   }
   const Eigen::VectorXd unit = whole.diagonal().cwiseSqrt().cwiseInverse();
@@ -254,7 +269,7 @@ PartFit PremiseMoments::fit(const BlockRange& range, const Indices& kept, const 
       offsets.empty() ? Eigen::MatrixXd(Eigen::MatrixXd::Zero(unit.size(), 0)) : solve(with, total.YY(kept, offsets));
   const auto count = static_cast<Eigen::Index>(range.last - range.first);
   Eigen::MatrixXd scores(unit.size(), count), squares(unit.size(), count);
-  const Eigen::MatrixXd inverse = solve(with, Eigen::MatrixXd::Identity(unit.size(), unit.size()));
+  const Eigen::MatrixXd& inverse = part.inverse = solve(with, Eigen::MatrixXd::Identity(unit.size(), unit.size()));
   for (Eigen::Index k = 0; k < count; ++k) {
     const MomentSums& s = blocks_[range.first + static_cast<std::size_t>(k)];
     const Eigen::MatrixXd YY = s.YY(kept, kept);
@@ -270,6 +285,16 @@ PartFit PremiseMoments::fit(const BlockRange& range, const Indices& kept, const 
   }
   part.usable = covariance.freedom > 0.0 && part.theta.allFinite() && part.error.allFinite();
   return part;
+}
+
+Eigen::VectorXd PremiseMoments::least_squares(std::size_t first, std::size_t last, const Indices& kept) const {
+  const MomentSums total = sums(first, last);
+  const Eigen::VectorXd unit =
+      total.YY.diagonal()(kept).unaryExpr([](double x) { return x > 0.0 ? 1.0 / std::sqrt(x) : 0.0; });
+  const Eigen::MatrixXd scaled = unit.asDiagonal() * total.YY(kept, kept) * unit.asDiagonal();
+  Eigen::VectorXd theta = Eigen::VectorXd::Zero(noise_.rows());
+  theta(kept) = unit.cwiseProduct(core::minimum_norm_solution(scaled, unit.cwiseProduct(total.Yy(kept))).col(0));
+  return theta;
 }
 
 ChangePlace PremiseMoments::change(const Indices& kept, double alike) const {
@@ -306,23 +331,200 @@ ChangePlace PremiseMoments::change(const Indices& kept, double alike) const {
   return place;
 }
 
+// A sum over the rows of ranges of the moments' blocks: coefficients of Σ Yᵀy, weighted.
+struct OverRange {
+  BlockRange range;
+  Eigen::VectorXd of_columns;
+};
+using SumOverRows = std::vector<OverRange>;
+
+// What the errors of a log may do to a sum over its rows without averaging out. Asked only of what stands out, since
+// both questions walk the log.
+class ErrorsInLog {
+ public:
+  ErrorsInLog(LogSource& log, const Setting& setting, const Widened& widened, const PremiseMoments& moments,
+              const Fit& fit)
+      : log_(log), setting_(setting), widened_(widened), moments_(moments), fit_(fit) {}
+
+  // Whether they may be anything within declared bounds: nothing is declared of their mean.
+  [[nodiscard]] bool are_bounded_only() const {
+    return setting_.noise_complete && !setting_.robot.noise.effort.bias.has_value();
+  }
+  // Whether they average out as far as the log shows it.
+  [[nodiscard]] bool average();
+  // The most that they make of the sums within their bounds; zero where they average out, or no bounds are declared.
+  [[nodiscard]] Eigen::VectorXd largest(const std::vector<SumOverRows>& sums) {
+    return are_bounded_only() && !average() ? worst_case(sums)
+                                            : Eigen::VectorXd::Zero(static_cast<Eigen::Index>(sums.size()));
+  }
+  // The same, whether they average out or not.
+  [[nodiscard]] Eigen::VectorXd worst_case(const std::vector<SumOverRows>& sums);
+
+  // Parameters that the whole log shows beside offsets of its efforts.
+  [[nodiscard]] Eigen::VectorXd model() const {
+    return moments_.least_squares(0, moments_.blocks(), joined(widened_.model, widened_.offsets));
+  }
+
+  // What makes entry `j` of a fit of these columns.
+  [[nodiscard]] OverRange entry(const PartFit& part, const BlockRange& range, const Indices& kept, Eigen::Index j,
+                                double sign = 1.0) const {
+    OverRange sum{range, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(widened_.setting.model.p()))};
+    sum.of_columns(kept) = sign * part.inverse.row(j).transpose();
+    return sum;
+  }
+
+ private:
+  LogSource& log_;
+  const Setting& setting_;
+  const Widened& widened_;
+  const PremiseMoments& moments_;
+  const Fit& fit_;
+  std::optional<bool> average_;
+};
+
+// Rows are alike for as long as the filter remembers: f₂ * f₂ by (1 + x)e⁻ˣ after x/β, f * f and what errors of the
+// motion leave by less. Rows that are alike for longer have errors that are. The model is given all that is tested, and
+// each piece of the log parameters of its own, so that what a premise breaks is not taken for errors.
+bool ErrorsInLog::average() {
+  constexpr std::size_t kPieces = 8;
+  constexpr std::array<double, 4> kAges = {6.0, 8.0, 12.0, 16.0};  // 1/β
+  constexpr double kRiskOfAverages = 0.02;                         // that errors which average out are said not to
+  if (average_) {
+    return *average_;
+  }
+  const auto p = static_cast<Eigen::Index>(widened_.setting.model.p());
+  const Indices kept = joined(joined(widened_.model, widened_.offsets), widened_.shapes);
+  Eigen::MatrixXd theta(p, static_cast<Eigen::Index>(kPieces));
+  std::vector<double> begins;
+  for (std::size_t k = 0; k < kPieces; ++k) {
+    const auto border = [&](std::size_t i) { return moments_.at_share(static_cast<double>(i) / kPieces); };
+    theta.col(static_cast<Eigen::Index>(k)) = moments_.least_squares(border(k), border(k + 1), kept);
+    begins.push_back(k > 0 && border(k) < moments_.blocks() ? moments_.begin_of(border(k)) : -core::kInfinity);
+  }
+  std::array<std::size_t, kAges.size()> lags{};
+  for (std::size_t i = 0; i < lags.size(); ++i) {
+    lags[i] = static_cast<std::size_t>(std::ceil(kAges[i] / (setting_.filter.beta * setting_.survey.median_step)));
+  }
+  std::deque<Eigen::VectorXd> before;
+  identify::BlockSums series(kAges.size());
+  Eigen::VectorXd products(static_cast<Eigen::Index>(kAges.size())), total = Eigen::VectorXd::Zero(products.size());
+  double squares = 0.0;
+  std::size_t piece = 0;
+  TorqueRows rows = make_rows(log_, widened_.setting, errors_of_fit(widened_.setting));
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
+    const auto n = static_cast<Eigen::Index>(block.outputs);
+    for (std::size_t k = 0; k < block.instants(); ++k) {
+      if (!signs_are_known(widened_, block, k)) {
+        continue;
+      }
+      while (piece + 1 < kPieces && block.t[k] >= begins[piece + 1]) {
+        ++piece;
+      }
+      const Eigen::Index at = static_cast<Eigen::Index>(k) * n;
+      const Eigen::VectorXd left = fit_.weights.cwiseProduct(
+          block.y.segment(at, n) - block.Y.middleRows(at, n) * theta.col(static_cast<Eigen::Index>(piece)));
+      before.push_front(left);
+      if (before.size() > lags.back()) {
+        for (std::size_t i = 0; i < lags.size(); ++i) {
+          products[static_cast<Eigen::Index>(i)] = left.dot(before[lags[i]]);
+        }
+        squares += left.squaredNorm();
+        total += products;
+        series.add(products);
+        before.pop_back();
+      }
+    }
+  });
+  log_.rewind();
+  const identify::LongRunCovariance covariance = identify::long_run_covariance(series);
+  const double t = covariance.freedom > 0.0
+                       ? core::student_quantile(1.0 - kRiskOfAverages / kAges.size(), covariance.freedom)
+                       : core::kInfinity;
+  average_ = true;
+  for (std::size_t i = 0; i < lags.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double alike = (1.0 + kAges[i]) * std::exp(-kAges[i]) * squares;
+    average_ = *average_ && std::abs(total[at]) <= alike + t * std::sqrt(std::max(0.0, covariance.matrix(at, at)));
+  }
+  return *average_;
+}
+
+Eigen::VectorXd ErrorsInLog::worst_case(const std::vector<SumOverRows>& sums) {
+  const auto count = static_cast<Eigen::Index>(sums.size());
+  filter::ErrorInfluence influence(widened_.setting.model, setting_.filter, setting_.measurement,
+                                   noise_budget(setting_.robot, setting_.measurement).sensors, model(), count);
+  TorqueRows rows = make_rows(log_, widened_.setting, errors_of_fit(widened_.setting));
+  core::RowMatrix g;
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
+    const auto n = static_cast<Eigen::Index>(block.outputs);
+    g.setZero(block.rows(), count);
+    for (std::size_t k = 0; k < block.instants(); ++k) {
+      if (!signs_are_known(widened_, block, k)) {
+        continue;
+      }
+      for (Eigen::Index i = 0; i < count; ++i) {
+        for (const OverRange& part : sums[static_cast<std::size_t>(i)]) {
+          if (moments_.holds(part.range, block.t[k])) {
+            const Eigen::Index at = static_cast<Eigen::Index>(k) * n;
+            g.block(at, i, n, 1) += fit_.weights.cwiseAbs2().cwiseProduct(block.Y.middleRows(at, n) * part.of_columns);
+          }
+        }
+      }
+    }
+    influence.add(block, g);
+  });
+  log_.rewind();
+  return influence.value();
+}
+
+constexpr const char* kErrorsMayDoIt =
+    "errors within their declared bounds may do that, and those of this log do not average out";
+
+double largest_speed(const Setting& s) {
+  return s.survey.largest_speed.empty() ? 0.0 : std::ranges::max(s.survey.largest_speed);
+}
+
+double noise_of_steps(const Setting& s) {
+  return s.measurement.motion == MotionKind::speed ? s.motion_noise->sd
+                                                   : std::numbers::sqrt2 * s.motion_noise->sd / s.survey.median_step;
+}
+
 // Whether the speed of single steps, which functions of the motion are made of, is told well enough for its square.
 bool speeds_are_fine(const Setting& s) {
   constexpr double kFine = 0.05;  // of the largest speed
-  double largest = 0.0;
-  for (const double speed : s.survey.largest_speed) {
-    largest = std::max(largest, speed);
-  }
-  const double noise = s.measurement.motion == MotionKind::speed
-                           ? s.motion_noise->sd
-                           : std::numbers::sqrt2 * s.motion_noise->sd / s.survey.median_step;
-  return noise <= kFine * largest;
+  return noise_of_steps(s) <= kFine * largest_speed(s);
+}
+
+// Whether reversals are: what noise and the motion within a step make of dry friction there looks like the root of the
+// speed.
+bool reversals_are_fine(const Setting& s) {
+  constexpr double kFine = 0.005, kOfStep = 0.3;  // of the largest speed
+  const std::vector<double>& sharpest = s.survey.sharpest_change;
+  const double change = s.survey.median_step * (sharpest.empty() ? 0.0 : std::ranges::max(sharpest));
+  return noise_of_steps(s) <= kFine * largest_speed(s) && change <= kOfStep * largest_speed(s);
 }
 
 // How far each effort may be off throughout: nothing where its noise is not declared.
 std::optional<double> declared_offset(const Setting& s) {
   const model::NoiseBound& effort = s.robot.noise.effort;
   return effort.value ? std::optional(std::min(effort.bias.value_or(*effort.value), *effort.value)) : std::nullopt;
+}
+
+// The offset of efforts that speeds which are off throughout, within their bound, make of viscous friction.
+double offset_by_speeds(const Setting& s, const Eigen::VectorXd& theta) {
+  const model::NoiseBound& speed = s.robot.noise.wheel_speed;
+  if (s.measurement.motion != MotionKind::speed || !speed.value) {
+    return 0.0;
+  }
+  Eigen::MatrixXd friction = Eigen::MatrixXd::Zero(s.model.input.rows(), s.model.motion.rows());
+  for (const Term& term : s.model.terms) {
+    if (term.kind == Term::Kind::speed) {
+      friction(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.coordinate)) +=
+          term.scale * theta[static_cast<Eigen::Index>(term.parameter)];
+    }
+  }
+  const Eigen::MatrixXd of_joints = core::pseudo_inverse(s.model.input) * friction * s.model.motion;
+  return std::min(speed.bias.value_or(*speed.value), *speed.value) * of_joints.cwiseAbs().rowwise().sum().maxCoeff();
 }
 
 std::string of_itself(double share) {
@@ -347,8 +549,8 @@ struct PartsApart {
   Eigen::Index column = 0;
 };
 
-void compare_parts(const Setting& s, const Widened& w, const PremiseMoments& moments, Premises& result,
-                   std::vector<LogContradiction>& out) {
+void compare_parts(const Setting& s, const Widened& w, const PremiseMoments& moments, ErrorsInLog& errors,
+                   Premises& result, std::vector<LogContradiction>& out) {
   std::vector<BlockRange> parts;
   const auto cut = [&](const std::vector<std::string>& names) {
     const auto count = static_cast<double>(names.size());
@@ -373,7 +575,8 @@ void compare_parts(const Setting& s, const Widened& w, const PremiseMoments& mom
   }
   const auto q = static_cast<Eigen::Index>(w.model.size());
   const double risk = kPremiseRisk / static_cast<double>(pairs.size() * w.model.size());
-  const double offset = declared_offset(s).value_or(0.0), effort = moments.effort();
+  const double offset = declared_offset(s).value_or(0.0) + offset_by_speeds(s, errors.model()),
+               effort = moments.effort();
   PartsApart worst;
   Eigen::VectorXd told = Eigen::VectorXd::Zero(q);
   const auto limit = [&](const PartFit& a, const PartFit& b, Eigen::Index j, double more) {
@@ -382,18 +585,33 @@ void compare_parts(const Setting& s, const Widened& w, const PremiseMoments& mom
     return (t + more) * error + std::abs(a.by_noise[j] - b.by_noise[j]) +
            offset * (a.by_offset.row(j) - b.by_offset.row(j)).cwiseAbs().sum();
   };
-  for (const auto& [a, b] : pairs) {
-    if (!fits[a].usable || !fits[b].usable) {
-      continue;
-    }
-    for (Eigen::Index j = 0; j < q; ++j) {
-      const double apart = std::abs(fits[a].theta[j] - fits[b].theta[j]);
-      const double times = apart / limit(fits[a], fits[b], j, 0.0);
-      if (times > worst.times) {
-        worst = {times, a, b, j};
+  std::erase_if(pairs, [&](const auto& pair) { return !fits[pair.first].usable || !fits[pair.second].usable; });
+  // With what errors may do to each difference, pair by pair; empty: nothing.
+  const auto compare = [&](const Eigen::VectorXd& by_errors) {
+    worst = {};
+    Eigen::Index at = 0;
+    for (const auto& [a, b] : pairs) {
+      for (Eigen::Index j = 0; j < q; ++j, ++at) {
+        const double more = by_errors.size() > 0 ? by_errors[at] : 0.0;
+        const double times = std::abs(fits[a].theta[j] - fits[b].theta[j]) / (limit(fits[a], fits[b], j, 0.0) + more);
+        if (times > worst.times) {
+          worst = {times, a, b, j};
+        }
+        told[j] = a == 0 ? limit(fits[a], fits[b], j, kAlwaysShows) + more : told[j];
       }
-      told[j] = a == 0 ? limit(fits[a], fits[b], j, kAlwaysShows) : told[j];
     }
+  };
+  compare({});
+  const bool stands_out = worst.times > 1.0;
+  if (stands_out) {
+    std::vector<SumOverRows> differences;
+    for (const auto& [a, b] : pairs) {
+      for (Eigen::Index j = 0; j < q; ++j) {
+        differences.push_back(
+            {errors.entry(fits[a], parts[a], w.model, j), errors.entry(fits[b], parts[b], w.model, j, -1.0)});
+      }
+    }
+    compare(errors.largest(differences));
   }
   std::string shows;
   bool everything = true;
@@ -409,7 +627,9 @@ void compare_parts(const Setting& s, const Widened& w, const PremiseMoments& mom
   shows = fmt::format("a change half-way would have shown of {}", shows);
   if (worst.times <= 1.0) {
     result.constant.verdict = everything ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
-    result.constant.detail = fmt::format("its {} agree; {}", fits.size() > 2 ? "halves and thirds" : "halves", shows);
+    const char* names = fits.size() > 2 ? "halves and thirds" : "halves";
+    result.constant.detail = stands_out ? fmt::format("its {} differ, but {}; {}", names, kErrorsMayDoIt, shows)
+                                        : fmt::format("its {} agree; {}", names, shows);
     return;
   }
   const auto at = static_cast<std::size_t>(w.model[static_cast<std::size_t>(worst.column)]);
@@ -424,7 +644,7 @@ void compare_parts(const Setting& s, const Widened& w, const PremiseMoments& mom
   result.constant.verdict = AssumptionVerdict::fails;
   result.constant.detail = fmt::format(
       "the {} of the log gives {} {:.5g} ± {:.2g} {}, the {} {:.5g} ± {:.2g} {}: {:.2g} times as far apart as parts of "
-      "one robot's log may be; {}",
+      "a log of one robot may be; {}",
       parts[worst.a].name, words.name, words.value(from), half(a), words.unit, parts[worst.b].name, words.value(to),
       half(b), words.unit, worst.times, time_of_change(s, moments, w.model));
   out.push_back({.kind = LogContradiction::Kind::halves_disagree,
@@ -438,8 +658,8 @@ void compare_parts(const Setting& s, const Widened& w, const PremiseMoments& mom
                          "commission the parts by themselves, or let `gap` look at the log"});
 }
 
-void test_offsets(const Setting& s, const Widened& w, const PremiseMoments& moments, Premises& result,
-                  std::vector<LogContradiction>& out) {
+void test_offsets(const Setting& s, const Widened& w, const PremiseMoments& moments, ErrorsInLog& errors,
+                  Premises& result, std::vector<LogContradiction>& out) {
   const std::optional<double> declared = declared_offset(s);
   if (!declared || w.offsets.empty() || s.measurement.effort_unsigned) {
     result.offset.detail = w.offsets.empty() ? "the model has a constant effort of its own"
@@ -447,9 +667,9 @@ void test_offsets(const Setting& s, const Widened& w, const PremiseMoments& mome
                                              : "the efforts have no sign";
     return;
   }
-  Indices kept = w.model;
-  kept.insert(kept.end(), w.offsets.begin(), w.offsets.end());
-  const PartFit fit = moments.fit({0, moments.blocks(), {}}, kept, {});
+  const Indices kept = joined(w.model, w.offsets);
+  const BlockRange whole{0, moments.blocks(), {}};
+  const PartFit fit = moments.fit(whole, kept, {});
   if (!fit.usable) {
     result.offset.detail = "offset and friction are one on this drive: drive both ways, each wheel at different speeds";
     return;
@@ -461,8 +681,12 @@ void test_offsets(const Setting& s, const Widened& w, const PremiseMoments& mome
     const auto at = static_cast<Eigen::Index>(w.model.size() + k);
     const double t = core::student_quantile(1.0 - risk, fit.freedom[at]);
     const double reach = t * fit.error[at] + std::abs(fit.by_noise[at]);
-    told = std::max(told, *declared + reach + kAlwaysShows * fit.error[at]);
-    if (std::abs(fit.theta[at]) - reach <= *declared) {
+    double limit = *declared;
+    if (std::abs(fit.theta[at]) - reach > limit && errors.are_bounded_only()) {
+      limit = std::max(limit, errors.worst_case({{errors.entry(fit, whole, kept, at)}})[0]);
+    }
+    told = std::max(told, limit + reach + kAlwaysShows * fit.error[at]);
+    if (std::abs(fit.theta[at]) - reach <= limit) {
       continue;
     }
     const std::string sentence = fmt::format(
@@ -489,25 +713,23 @@ void test_offsets(const Setting& s, const Widened& w, const PremiseMoments& mome
   result.offset.detail = fmt::format("an offset of {:.2g} {} would have shown", told, unit);
 }
 
-void test_friction(const Setting& s, const Widened& w, const PremiseMoments& moments, Premises& result,
-                   std::vector<LogContradiction>& out) {
+void test_friction(const Setting& s, const Widened& w, const PremiseMoments& moments, ErrorsInLog& errors,
+                   Premises& result, std::vector<LogContradiction>& out) {
   if (w.shapes.empty()) {
     result.friction.detail = "the robot file names effects of its own";
     return;
   }
-  if (!speeds_are_fine(s)) {
+  if (!speeds_are_fine(s) || (!w.dry.empty() && !reversals_are_fine(s))) {
     result.friction.detail = "the speeds of single steps are too rough to tell shapes of friction";
     return;
   }
-  Indices kept = w.model;
-  kept.insert(kept.end(), w.offsets.begin(), w.offsets.end());
+  Indices kept;
+  const BlockRange whole{0, moments.blocks(), {}};
   PartFit fit;
   for (const bool with_offsets : {true, false}) {
     if (!fit.usable) {
-      kept = w.model;
-      kept.insert(kept.end(), w.offsets.begin(), with_offsets ? w.offsets.end() : w.offsets.begin());
-      kept.insert(kept.end(), w.shapes.begin(), w.shapes.end());
-      fit = moments.fit({0, moments.blocks(), {}}, kept, w.offsets);
+      kept = joined(with_offsets ? joined(w.model, w.offsets) : w.model, w.shapes);
+      fit = moments.fit(whole, kept, w.offsets);
     }
   }
   if (!fit.usable) {
@@ -517,16 +739,18 @@ void test_friction(const Setting& s, const Widened& w, const PremiseMoments& mom
   const double effort = moments.effort(), offset = declared_offset(s).value_or(0.0);
   // Errors that may be anything within their bound, for ever, may follow the motion and look like friction of any
   // shape.
-  const bool averages = !s.noise_complete || s.robot.noise.effort.bias.has_value();
-  const double hidden = averages ? 0.0 : s.declared.output.minCoeff();
+  const double hidden = errors.are_bounded_only() ? s.declared.output.minCoeff() : 0.0;
   const double risk = kPremiseRisk / static_cast<double>(w.shapes.size());
   const bool without_offsets = kept.size() == w.model.size() + w.shapes.size();
   double told = 0.0;
   for (std::size_t k = 0; k < w.shapes.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(kept.size() - w.shapes.size() + k);
     const double t = core::student_quantile(1.0 - risk, fit.freedom[at]);
-    const double reach = t * fit.error[at] + std::abs(fit.by_noise[at]) +
-                         (without_offsets ? offset * fit.by_offset.row(at).cwiseAbs().sum() : 0.0);
+    double reach = t * fit.error[at] + std::abs(fit.by_noise[at]) +
+                   (without_offsets ? offset * fit.by_offset.row(at).cwiseAbs().sum() : 0.0);
+    if (std::abs(fit.theta[at]) > reach && moments.column(w.shapes[k]) * std::abs(fit.theta[at]) > hidden) {
+      reach += errors.largest({{errors.entry(fit, whole, kept, at)}})[0];
+    }
     const double share = effort > 0.0 ? moments.column(w.shapes[k]) / effort : 0.0;
     told = std::max({told, share * (reach + kAlwaysShows * fit.error[at]), effort > 0.0 ? hidden / effort : 0.0});
     if (std::abs(fit.theta[at]) <= reach || moments.column(w.shapes[k]) * std::abs(fit.theta[at]) <= hidden ||
@@ -586,10 +810,23 @@ Premises test_premises(LogSource& log, const Setting& s, const Fit& fit, std::ve
     return result;
   }
   const PremiseMoments moments(rows, fit.weights, *noise);
-  compare_parts(s, w, moments, result, out);
-  test_offsets(s, w, moments, result, out);
-  test_friction(s, w, moments, result, out);
+  ErrorsInLog errors(log, s, w, moments, fit);
+  compare_parts(s, w, moments, errors, result, out);
+  test_offsets(s, w, moments, errors, result, out);
+  test_friction(s, w, moments, errors, result, out);
   return result;
+}
+
+bool errors_average(LogSource& log, const Setting& s, const Fit& fit) {
+  const Widened w = widened_for_premises(s, fit);
+  const RegressionMoments rows = premise_moments(log, w);
+  const std::optional<identify::RowNoise> noise = row_noise(w.setting);
+  if (!noise || w.model.empty() || s.measurement.effort_unsigned) {
+    return true;
+  }
+  const PremiseMoments moments(rows, fit.weights, *noise);
+  ErrorsInLog errors(log, s, w, moments, fit);
+  return !errors.are_bounded_only() || errors.average();
 }
 
 }  // namespace wheelwright::commission

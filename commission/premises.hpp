@@ -26,7 +26,9 @@ inline constexpr double kPremiseRisk = 1e-3;
 ///   - Student's t at kPremiseRisk divided by the number of tests, with standard errors and degrees of freedom that
 ///     allow for autocorrelated residuals and for motion that is seen in one stretch only, and
 ///   - what taking the noise of the motion out of Σ YᵀY, or not, makes of them (errors in variables), and
-///   - of differences, what an offset within its declared limit makes of them.
+///   - of differences, what an offset within its declared limit makes of them, and
+///   - where errors do not average out (errors_average()), and of offsets where no bias is declared, the most that errors
+///     within their declared bounds make of them (filter::ErrorInfluence). That walks the log again.
 /// Instants at which noise leaves the sign of dry friction open are left out. A part in which less than half of the
 /// motion in some direction is more than noise is not judged; nothing is where the noise of the motion is not known.
 ///
@@ -35,5 +37,11 @@ inline constexpr double kPremiseRisk = 1e-3;
 /// offset, and of shapes no more than a twentieth of the effort.
 [[nodiscard]] Premises test_premises(LogSource& log, const Setting& setting, const Fit& fit,
                                      std::vector<LogContradiction>& out);
+
+/// Whether errors of the log average out as far as it shows. Where nothing is declared of their mean, errors within
+/// their bounds may do to any least-squares estimate what a broken premise does; what the model leaves, with all that
+/// is tested in it and parameters of their own in each eighth of the log, is then like what it left when the filter had
+/// forgotten that. True where a bias is declared (its own test says whether it holds), or no bound. Two walks.
+[[nodiscard]] bool errors_average(LogSource& log, const Setting& setting, const Fit& fit);
 
 }  // namespace wheelwright::commission
