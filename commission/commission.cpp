@@ -126,9 +126,9 @@ double least_thrust(std::vector<HeldStep> steps) {
   return best;
 }
 
-// What bounds 1/inertia before there is a set, where efforts are held and each has a coordinate of its own: of two steps
-// with the same friction, the second no slower, u1 − u2 <= m (a1 − a2) <= 2 m (limit of the accelerations). Empty where a
-// coordinate has no such steps.
+// What bounds 1/inertia before there is a set, where efforts are held and each has a coordinate of its own: of two
+// steps with the same friction, the second no slower, u1 − u2 <= m (a1 − a2) <= 2 m (limit of the accelerations). Empty
+// where a coordinate has no such steps.
 filter::MotionBound bound_by_thrust(LogSource& log, const Setting& s, const SignalErrors& errors) {
   const std::size_t n = s.model.coordinates.size();
   if (errors.motion.limit.size() == 0 || filter::flow_kind(s.model) == filter::FlowKind::none) {

@@ -61,8 +61,8 @@ struct ReferenceMotion {
   }
   /// With what share of its weight rows hold what happens between instants k and k + 1.
   [[nodiscard]] double held(std::size_t k) const { return k + 1 < weights.size() ? weights[k + 1] : 1.0; }
-  /// With what share of its weight rows hold a jump of the motion that the sample of instant k is the first to show: for
-  /// speeds that of the step that ends there.
+  /// With what share of its weight rows hold a jump of the motion that the sample of instant k is the first to show:
+  /// for speeds that of the step that ends there.
   [[nodiscard]] double held_jump(std::size_t k) const {
     return kind != MotionKind::speed ? held(k) : weights.empty() ? 1.0 : weights[k];
   }
