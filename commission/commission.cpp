@@ -145,8 +145,11 @@ filter::MotionBound bound_by_thrust(LogSource& log, const Setting& s, const Sign
     for (std::size_t c = 0; c < pick.size(); ++c) {
       sample[c] = block.columns[pick[c]][k];
     }
+    if (!elements.step(block.t[k], sample)) {
+      return;
+    }
     const filter::StepMotion& step = elements.last_step();
-    if (!elements.step(block.t[k], sample) || !step.known || !step.held ||
+    if (!step.known || !step.held ||
         std::ranges::any_of(step.values, [](const model::TermValue& value) { return value.error > 0.0; })) {
       return;
     }

@@ -75,8 +75,8 @@ struct SignalFindings {
 
 /// Weighs what statistics found in a log of declared noise against `explained`: Kind::effort_timing (`timing`),
 /// Kind::wrong_sign and Kind::estimate_outside keep LogContradiction::withdraws only beyond all of it, are
-/// LogContradiction::demotes beyond what is in doubt (signs and estimates only where `errors_average`, see premises.hpp:
-/// elsewhere noise explains them as well), and a shift below that is dropped.
+/// LogContradiction::demotes beyond what is in doubt (signs and estimates only where `errors_average`, see
+/// premises.hpp: elsewhere noise explains them as well), and a shift below that is dropped.
 void weigh_contradictions(Commissioning& result, const Setting& setting, const Fit& fit,
                           const std::optional<EffortTiming>& timing, const Explained& explained, bool errors_average);
 

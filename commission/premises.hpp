@@ -27,8 +27,8 @@ inline constexpr double kPremiseRisk = 1e-3;
 ///     allow for autocorrelated residuals and for motion that is seen in one stretch only, and
 ///   - what taking the noise of the motion out of Σ YᵀY, or not, makes of them (errors in variables), and
 ///   - of differences, what an offset within its declared limit makes of them, and
-///   - where errors do not average out (errors_average()), and of offsets where no bias is declared, the most that errors
-///     within their declared bounds make of them (filter::ErrorInfluence). That walks the log again.
+///   - where errors do not average out (errors_average()), and of offsets where no bias is declared, the most that
+///     errors within their declared bounds make of them (filter::ErrorInfluence). That walks the log again.
 /// Instants at which noise leaves the sign of dry friction open are left out. A part in which less than half of the
 /// motion in some direction is more than noise is not judged; nothing is where the noise of the motion is not known.
 ///

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Efforts that a low-pass filter smoothed before they were logged: rows made of them are those of the efforts that
-// acted, within the bounds, for every time constant in the declared range, where rows are lost and efforts are late, too.
+// acted, within the bounds, for every time constant in the declared range, with lost rows and late efforts, too.
 #include <cmath>
 #include <random>
 #include <string>
