@@ -21,11 +21,11 @@
 #include "commission/premises.hpp"
 #include "commission/setting.hpp"
 #include "commission/setting_rows.hpp"
+#include "commission/thrust_bound.hpp"
 #include "commission/two_walks.hpp"
 #include "core/check.hpp"
 #include "core/limits.hpp"
 #include "core/log.hpp"
-#include "model/filter/element_filter.hpp"
 #include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
@@ -91,110 +91,18 @@ double widths(const Box& hull, const Box& unit) {
   return sum / static_cast<double>(hull.dimension());
 }
 
-// What a step of held efforts says of one coordinate.
-struct HeldStep {
-  unsigned signs = 0;                   // which way joints turn, a bit for each
-  double slowest = 0.0, fastest = 0.0;  // mean speed
-  double least = 0.0, most = 0.0;       // effort
-};
-
-// The largest u1 − u2 of two steps of the same signs, the second of them no slower than the first; 0 without such.
-double least_thrust(std::vector<HeldStep> steps) {
-  double best = 0.0;
-  std::vector<HeldStep> slower = steps;
-  const auto by = [](double HeldStep::*speed) {
-    return [speed](const HeldStep& a, const HeldStep& b) {
-      return a.signs != b.signs ? a.signs < b.signs : a.*speed < b.*speed;
-    };
-  };
-  std::ranges::sort(steps, by(&HeldStep::slowest));
-  std::ranges::sort(slower, by(&HeldStep::fastest));
-  auto next = slower.begin();
-  unsigned signs = 0;
-  double most = -core::kInfinity;
-  for (const HeldStep& step : steps) {
-    if (step.signs != signs) {
-      signs = step.signs;
-      most = -core::kInfinity;
-    }
-    for (; next != slower.end() && (next->signs < signs || (next->signs == signs && next->fastest <= step.slowest));
-         ++next) {
-      most = next->signs == signs ? std::max(most, next->least) : most;
-    }
-    best = std::max(best, most - step.most);
-  }
-  return best;
-}
-
-// What bounds 1/inertia before there is a set, where efforts are held and each has a coordinate of its own: of two
-// steps with the same friction, the second no slower, u1 − u2 <= m (a1 − a2) <= 2 m (limit of the accelerations). Empty
-// where a coordinate has no such steps.
-filter::MotionBound bound_by_thrust(LogSource& log, const Setting& s, const SignalErrors& errors) {
-  const std::size_t n = s.model.coordinates.size();
-  if (errors.motion.limit.size() == 0 || filter::flow_kind(s.model) == filter::FlowKind::none) {
-    return {};
-  }
-  filter::ElementFilter elements(s.model, s.measurement, errors);
-  const std::vector<std::size_t> pick = core::positions_of(log, s.measurement.columns());
-  std::vector<double> sample(pick.size());
-  std::vector<std::vector<HeldStep>> steps(n);
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
-      elements.restart();
-    }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    if (!elements.step(block.t[k], sample)) {
-      return;
-    }
-    const filter::StepMotion& step = elements.last_step();
-    if (!step.known || !step.held ||
-        std::ranges::any_of(step.values, [](const model::TermValue& value) { return value.error > 0.0; })) {
-      return;
-    }
-    unsigned signs = 0;
-    for (Eigen::Index j = 0; j < step.joint_speed.size(); ++j) {
-      signs = 2 * signs + (step.joint_speed[j] > 0.0 ? 1 : 0);
-    }
-    for (std::size_t c = 0; c < n; ++c) {
-      const auto i = static_cast<Eigen::Index>(c);
-      const double error = step.speed_error[i] + (step.ends ? step.departure[i] : 0.0);
-      steps[c].push_back({signs, step.speed[i] - error, step.speed[i] + error, step.effort[i] - step.effort_error[i],
-                          step.effort[i] + step.effort_error[i]});
-    }
-  });
-  filter::MotionBound bound = errors.motion;
-  bound.mobility = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
-  for (std::size_t c = 0; c < n; ++c) {
-    const auto i = static_cast<Eigen::Index>(c);
-    const double thrust = least_thrust(std::move(steps[c]));
-    if (!(thrust > 0.0)) {
-      return {};
-    }
-    bound.mobility(i, i) = core::round_up((2.0 + 1e-9) * bound.limit[i] / thrust);
-  }
-  return bound;
-}
-
-Eigen::VectorXd magnitudes(const Box& box) {
-  Eigen::VectorXd largest(static_cast<Eigen::Index>(box.dimension()));
-  std::ranges::transform(box.sides, largest.begin(), core::magnitude);
-  return largest;
-}
-
 Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors errors, std::size_t outliers) {
   constexpr int kPasses = 4;
   constexpr double kWorthAnother = 0.98;  // of the widths
   Bounded best;
   best.learning = best.driving = errors.motion;
-  const filter::MotionBound thrust = bound_by_thrust(log, s, errors);
+  // Outliers are outside of all bounds, in pairs of steps too.
+  const filter::MotionBound thrust =
+      outliers > 0 ? filter::MotionBound{} : thrust_bound(log, s.model, s.measurement, errors);
   const bool thrusts = thrust.mobility.size() > 0;
   SignalErrors first = errors;
-  if (thrusts) {
-    first.motion = best.learning = thrust;
-    first.motion.largest = best.learning.largest = magnitudes(s.prior);
-  }
+  sharpen(first.motion, thrust, s.prior);
+  best.learning = first.motion;
   best.result = set_of(log, s, part, first, outliers);
   const bool declared = s.robot.limits.contains("acceleration");
   for (int pass = 1; pass < kPasses && errors.between_samples; ++pass) {
@@ -213,10 +121,7 @@ Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors er
         best.driving.limit = errors.motion.limit;
       }
     }
-    if (thrusts) {
-      bound.mobility = heavy ? bound.mobility.cwiseMin(thrust.mobility).eval() : thrust.mobility;
-      bound.largest = magnitudes(best.result.set.hull);
-    }
+    sharpen(bound, thrust, best.result.set.hull);
     bound.limit = errors.motion.limit;
     SignalErrors sharper = errors;
     sharper.motion = bound;

@@ -86,7 +86,7 @@ std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s
   const double step = s.survey.median_step;
   RegressionBlock rows = sharpened_rows(log, wide, kNearlySharp * step, most_rows, true);
   const RegressionBlock by_one = sharpened_rows(log, wide, step / std::numbers::ln2, most_rows, true);
-  if (rows.t != by_one.t) {
+  if (rows.t != by_one.t || rows.instants() < kFewestInstants) {
     return std::nullopt;
   }
   // One more column: what κ = 1 adds to the efforts.

@@ -11,6 +11,7 @@
 
 #include "bounds/slab_rows.hpp"
 #include "commission/noise_budget.hpp"
+#include "commission/thrust_bound.hpp"
 #include "core/check.hpp"
 #include "core/limits.hpp"
 #include "detector/threshold.hpp"
@@ -43,6 +44,15 @@ RowRate rate(const bounds::HalfSpace& from, const bounds::HalfSpace& to, double 
   return {(to.a - from.a) / step, (to.b - from.b) / step};
 }
 
+filter::SignalErrors declared_errors(const Commissioning& c, const RobotAt& at, double confidence) {
+  return filter::propagate(model::make_model(at.robot), at.filter, c.model.measurement,
+                           commission::noise_budget(at.robot, c.model.measurement).sensors,
+                           {.mode = c.noise_mode,
+                            .confidence = confidence,
+                            .rows = static_cast<double>(c.survey.rows),
+                            .largest_step = c.survey.largest_step});
+}
+
 }  // namespace
 
 bool noise_is_declared(const Commissioning& c) {
@@ -52,13 +62,20 @@ bool noise_is_declared(const Commissioning& c) {
 
 Box prior_of(const Robot& robot) { return Box{model::prior_box(robot, model::make_model(robot)).bounds}; }
 
-filter::MotionBound motion_at(const Commissioning& c, const RobotAt& at, std::span<const Interval> sides) {
+filter::MotionBound motion_at(LogSource& log, const Commissioning& c, const RobotAt& at,
+                              std::span<const Interval> sides, double confidence) {
   const Model model = model::make_model(at.robot);
   const Measurement& measurement = c.model.measurement;
   filter::MotionBound bound = sides.empty() ? filter::MotionBound{} : filter::motion_bound(model, sides);
   bound.limit = commission::coordinate_limit(
       model, commission::acceleration_limit(at.robot, c.survey, measurement.motion,
                                             commission::noise_budget(at.robot, measurement).sensors.motion));
+  if (noise_is_declared(c) && c.dropped.empty()) {
+    filter::SignalErrors errors = declared_errors(c, at, confidence);
+    errors.motion.limit = bound.limit;
+    commission::sharpen(bound, commission::thrust_bound(log, model, measurement, errors),
+                        sides.empty() ? prior_of(at.robot) : Box{{sides.begin(), sides.end()}});
+  }
   return bound;
 }
 
@@ -68,11 +85,7 @@ TorqueRows rows_of(LogSource& log, const Commissioning& c, const RobotAt& at, co
   const Measurement& measurement = c.model.measurement;
   filter::SignalErrors errors = c.row_errors;
   if (noise_is_declared(c)) {
-    errors = filter::propagate(model, at.filter, measurement, commission::noise_budget(at.robot, measurement).sensors,
-                               {.mode = c.noise_mode,
-                                .confidence = confidence,
-                                .rows = static_cast<double>(c.survey.rows),
-                                .largest_step = c.survey.largest_step});
+    errors = declared_errors(c, at, confidence);
     const Eigen::VectorXd effort = errors.motion.effort;
     errors.motion = motion;
     errors.motion.effort = effort;
@@ -283,7 +296,7 @@ std::vector<BoundPass> bound_passes(LogSource& log, const Commissioning& c, doub
   std::vector<Interval> sides;
   const auto add = [&](const FeasibleSet& set, const std::vector<std::size_t>& dropped) {
     BoundPass pass{hull_optima(*set.polytope, c.prior), std::exchange(sides, set.hull.sides)};
-    TorqueRows rows = rows_of(log, c, at, motion_at(c, at, pass.sides), confidence);
+    TorqueRows rows = rows_of(log, c, at, motion_at(log, c, at, pass.sides, confidence), confidence);
     add_active_rows(pass.optima, rows, dropped);
     passes.push_back(std::move(pass));
   };
@@ -317,7 +330,7 @@ BoundRates bound_rates(LogSource& log, const Commissioning& c, const std::vector
       kink = moved.kink;
       const LogRows wanted = active_rows(optima);
       const auto rows_beside = [&](const RobotAt& at, const std::vector<Interval>& sides, const Box& prior) {
-        TorqueRows rows = rows_of(log, c, at, motion_at(c, at, sides), confidence);
+        TorqueRows rows = rows_of(log, c, at, motion_at(log, c, at, sides, confidence), confidence);
         // An input of the prior moves its sides only: the signs that rows count with stay.
         return pick_rows(rows, input.prior ? c.prior : prior, wanted);
       };

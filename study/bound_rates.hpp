@@ -54,9 +54,10 @@ struct RowRates {
 [[nodiscard]] Box prior_of(const Robot& robot);
 
 /// Bound on the acceleration of the robot `at` between samples, for rows that stand on declared noise: by the limit of
-/// its accelerations and, where there are `sides` (p), by the dynamics with all parameters inside them.
-[[nodiscard]] filter::MotionBound motion_at(const Commissioning& commissioning, const RobotAt& at,
-                                            std::span<const Interval> sides);
+/// its accelerations, by pairs of steps of `log` (commission::thrust_bound) and, where there are `sides` (p), by the
+/// dynamics with all parameters inside them. `confidence` as CommissionOptions has it.
+[[nodiscard]] filter::MotionBound motion_at(LogSource& log, const Commissioning& commissioning, const RobotAt& at,
+                                            std::span<const Interval> sides, double confidence);
 
 /// The rows of `log` for the robot and filter `at`, all else as `commissioning` chose it: the same columns and
 /// instants; errors are propagated anew where noise is declared, with `motion` between samples, else they stay.

@@ -222,7 +222,10 @@ void StepEnclosure::evaluate(const Model& model, StepMotion& step) const {
   };
   double turned = 0.0;
   speed_ = step.speed;
-  speed_error_ = bound_.empty() ? step.speed_error : kUp * (step.speed_error + step.departure);
+  speed_error_ = step.speed_error;
+  if (!bound_.empty()) {
+    speed_error_ = kUp * (speed_error_ + step.departure);
+  }
   for (std::size_t j = 0; j < joints; ++j) {
     const auto i = static_cast<Eigen::Index>(j);
     joint_speed_[i] = step.joint_speed[i];

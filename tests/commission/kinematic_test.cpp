@@ -119,7 +119,7 @@ TEST(Kinematic, AHeadingOfItsOwnIsNeverSaidToBeTheWheels) {
   int hidden = 0;
   for (const double rate : {50.0, 200.0}) {
     for (const double counts : {256.0, 2048.0, 8192.0}) {
-      for (const double heading : {0.0002, 0.0007, 0.003}) {
+      for (const double heading : {0.00002, 0.0002, 0.0007, 0.003}) {
         Scenario s = posed_drive(++seed);
         s.rate = rate;
         s.robot.encoder_counts_per_turn = s.sensors.encoder_counts_per_turn = counts;

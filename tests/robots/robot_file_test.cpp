@@ -198,7 +198,8 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"effort: {delay: [0.01]}", "effort.delay: a list of 1: expected seconds between -1 and 1, or two such"},
         Bad{"effort: {delay: [0.02, 0.01]}", "effort.delay: '0.01': expected seconds between -1 and 1, or two such"},
         Bad{"effort: {knd: torque}",
-            "effort: unknown key 'knd': expected one of kind, hold, unsigned, changes, delay; did you mean 'kind'?"},
+            "effort: unknown key 'knd': expected one of kind, hold, unsigned, changes, delay, smoothing; did you mean "
+            "'kind'?"},
         Bad{"nominal: {mas: 3}", "nominal: unknown key 'mas'"},
         Bad{"nominal: {mass: -3}", "nominal.mass: '-3': expected a number > 0"},
         Bad{"nominal: {mass: heavy}", "nominal.mass: 'heavy': expected a number > 0"},
