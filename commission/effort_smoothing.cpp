@@ -36,6 +36,22 @@ RegressionBlock sharpened_rows(LogSource& log, Setting s, double time, std::size
   return rows;
 }
 
+// Rows with κ next to 0, and with κ = 1.
+struct TwoSharpenings {
+  RegressionBlock rows, by_one;
+};
+
+// Nothing where there are too few, or not the same in both.
+std::optional<TwoSharpenings> two_sharpenings(LogSource& log, const Setting& s, std::size_t most_rows, bool bridges) {
+  const double step = s.survey.median_step;
+  TwoSharpenings both{sharpened_rows(log, s, kNearlySharp * step, most_rows, bridges),
+                      sharpened_rows(log, s, step / std::numbers::ln2, most_rows, bridges)};
+  if (both.rows.t != both.by_one.t || both.rows.instants() < kFewestInstants) {
+    return std::nullopt;
+  }
+  return both;
+}
+
 identify::ResidualSummary summary_of(const RegressionBlock& rows, const identify::LeastSquaresFit& fit,
                                      const Eigen::VectorXd& weights) {
   identify::ResidualStatistics statistics(fit.estimate, weights);
@@ -83,12 +99,11 @@ std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s
     return std::nullopt;
   }
   const Setting wide = as_logged(s);
-  const double step = s.survey.median_step;
-  RegressionBlock rows = sharpened_rows(log, wide, kNearlySharp * step, most_rows, true);
-  const RegressionBlock by_one = sharpened_rows(log, wide, step / std::numbers::ln2, most_rows, true);
-  if (rows.t != by_one.t || rows.instants() < kFewestInstants) {
+  const std::optional<TwoSharpenings> both = two_sharpenings(log, wide, most_rows, true);
+  if (!both) {
     return std::nullopt;
   }
+  const auto& [rows, by_one] = *both;
   // One more column: what κ = 1 adds to the efforts.
   const auto n = static_cast<Eigen::Index>(rows.outputs), p = static_cast<Eigen::Index>(rows.parameters);
   Eigen::VectorXd open = Eigen::VectorXd::Zero(rows.rows());
@@ -140,11 +155,11 @@ std::optional<EffortSmoothing> effort_smoothing(LogSource& log, const Setting& s
 EffortLag effort_lag(LogSource& log, const Setting& s, const Fit& fit, double delay, std::size_t most_rows) {
   const Setting wide = as_logged(s);
   const double step = s.survey.median_step;
-  const RegressionBlock rows = sharpened_rows(log, wide, kNearlySharp * step, most_rows, false);
-  const RegressionBlock by_one = sharpened_rows(log, wide, step / std::numbers::ln2, most_rows, false);
-  if (rows.t != by_one.t || rows.instants() < kFewestInstants) {
+  const std::optional<TwoSharpenings> both = two_sharpenings(log, wide, most_rows, false);
+  if (!both) {
     return EffortLag::either;
   }
+  const auto& [rows, by_one] = *both;
   try {
     const identify::TimeShiftedRows shifted(rows, identify::TimeEffect::delay, delay - step, delay + step);
     identify::SeparableValues at;

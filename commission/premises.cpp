@@ -338,6 +338,9 @@ struct OverRange {
 };
 using SumOverRows = std::vector<OverRange>;
 
+// Whether errors may be anything within declared bounds: nothing is declared of their mean.
+bool errors_are_bounded_only(const Setting& s) { return s.noise_complete && !s.robot.noise.effort.bias.has_value(); }
+
 // What the errors of a log may do to a sum over its rows without averaging out. Asked only of what stands out, since
 // both questions walk the log.
 class ErrorsInLog {
@@ -346,10 +349,7 @@ class ErrorsInLog {
               const Fit& fit)
       : log_(log), setting_(setting), widened_(widened), moments_(moments), fit_(fit) {}
 
-  // Whether they may be anything within declared bounds: nothing is declared of their mean.
-  [[nodiscard]] bool are_bounded_only() const {
-    return setting_.noise_complete && !setting_.robot.noise.effort.bias.has_value();
-  }
+  [[nodiscard]] bool are_bounded_only() const { return errors_are_bounded_only(setting_); }
   // Whether they average out as far as the log shows it.
   [[nodiscard]] bool average();
   // The most that they make of the sums within their bounds; zero where they average out, or no bounds are declared.
@@ -818,15 +818,17 @@ Premises test_premises(LogSource& log, const Setting& s, const Fit& fit, std::ve
 }
 
 bool errors_average(LogSource& log, const Setting& s, const Fit& fit) {
-  const Widened w = widened_for_premises(s, fit);
-  const RegressionMoments rows = premise_moments(log, w);
-  const std::optional<identify::RowNoise> noise = row_noise(w.setting);
-  if (!noise || w.model.empty() || s.measurement.effort_unsigned) {
+  if (!errors_are_bounded_only(s) || s.measurement.effort_unsigned) {
     return true;
   }
+  const Widened w = widened_for_premises(s, fit);
+  const std::optional<identify::RowNoise> noise = row_noise(w.setting);
+  if (!noise || w.model.empty()) {
+    return true;
+  }
+  const RegressionMoments rows = premise_moments(log, w);
   const PremiseMoments moments(rows, fit.weights, *noise);
-  ErrorsInLog errors(log, s, w, moments, fit);
-  return !errors.are_bounded_only() || errors.average();
+  return ErrorsInLog(log, s, w, moments, fit).average();
 }
 
 }  // namespace wheelwright::commission

@@ -54,17 +54,12 @@ filter::MotionBound thrust_bound(LogSource& log, const Model& model, const filte
     return {};
   }
   filter::ElementFilter elements(model, measurement, errors);
-  const std::vector<std::size_t> pick = core::positions_of(log, measurement.columns());
-  std::vector<double> sample(pick.size());
   std::vector<std::vector<HeldStep>> steps(n);
-  core::for_each_row(log, [&](const LogBlock& block, std::size_t k, bool starts) {
-    if (starts) {
+  core::for_each_sample(log, measurement.columns(), [&](const core::LogSample& sample) {
+    if (sample.starts) {
       elements.restart();
     }
-    for (std::size_t c = 0; c < pick.size(); ++c) {
-      sample[c] = block.columns[pick[c]][k];
-    }
-    if (!elements.step(block.t[k], sample)) {
+    if (!elements.step(sample.t, sample.values)) {
       return;
     }
     const filter::StepMotion& step = elements.last_step();

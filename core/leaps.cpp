@@ -15,14 +15,6 @@ constexpr double kTimesUsual = 10.0;     // of a quantile of changes from row to
 constexpr double kMostLeaps = 0.1;       // share of the rows
 constexpr double kTimesTheirSize = 3.0;  // of the rows that do not leap
 
-double at_rank(std::vector<double> values, double q) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1));
-  return order_statistic(std::move(values), rank);
-}
-
 // Sizes of the values, and of the changes from row to row, of rows that are not left out.
 struct Sizes {
   std::vector<double> values, changes;
@@ -72,14 +64,14 @@ std::vector<bool> leaps_in(std::span<const double> values, std::span<const RowRa
 
 double least_leap(std::span<const double> values, std::span<const RowRange> segments, double share) {
   const Sizes all = sizes_of(values, segments, std::vector<bool>(values.size(), false));
-  double least = std::max(kTimesUsual * at_rank(all.changes, 0.99), share * at_rank(all.values, 0.999));
-  const std::vector<bool> leaps = leaps_in(values, segments, kTimesUsual * at_rank(all.changes, 0.8));
+  double least = std::max(kTimesUsual * quantile(all.changes, 0.99), share * quantile(all.values, 0.999));
+  const std::vector<bool> leaps = leaps_in(values, segments, kTimesUsual * quantile(all.changes, 0.8));
   const auto many = static_cast<double>(std::ranges::count(leaps, true));
   if (share > 0.0 && many > 0.0 && many <= kMostLeaps * static_cast<double>(all.values.size())) {
     const Sizes others = sizes_of(values, segments, leaps);
-    const double size = at_rank(others.values, 0.99);
+    const double size = quantile(others.values, 0.99);
     if (size > 0.0) {
-      least = std::min(least, std::max(kTimesUsual * at_rank(others.changes, 0.99), kTimesTheirSize * size));
+      least = std::min(least, std::max(kTimesUsual * quantile(others.changes, 0.99), kTimesTheirSize * size));
     }
   }
   return least > 0.0 ? least : std::numeric_limits<double>::infinity();

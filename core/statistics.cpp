@@ -46,6 +46,14 @@ double order_statistic(std::vector<double> values, std::size_t rank) {
   return *at;
 }
 
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) {
+    return 0.0;
+  }
+  const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1));
+  return order_statistic(std::move(values), rank);
+}
+
 double median(std::vector<double> values) {
   const std::size_t middle = values.size() / 2;
   return order_statistic(std::move(values), middle);

@@ -15,6 +15,9 @@ namespace wheelwright::core {
 /// The value of this rank, 0 the smallest. `rank` is less than the number of values.
 [[nodiscard]] double order_statistic(std::vector<double> values, std::size_t rank);
 
+/// The value of rank q (n − 1), rounded down; 0 where there are no values.
+[[nodiscard]] double quantile(std::vector<double> values, double q);
+
 /// The median of `values`, of two middle ones the larger. At least one value.
 [[nodiscard]] double median(std::vector<double> values);
 

@@ -87,7 +87,7 @@ void check_speeds(const std::vector<double>& speeds, double top, const char* uni
   if (fast.size() < 20) {
     return;
   }
-  const double low = quantile(fast, 0.1), high = quantile(fast, 0.9);
+  const double low = core::quantile(fast, 0.1), high = core::quantile(fast, 0.9);
   const bool narrow = high < 1.3 * low;
   out.push_back(about_motion(
       "motion.speeds", narrow ? FindingSeverity::notice : FindingSeverity::fine,
@@ -216,7 +216,7 @@ void check_traction(const HealthView& view, std::vector<LogFinding>& out) {
                       std::abs((j.smooth[k + span] - j.smooth[k - span]) / (t[k + span] - t[k - span])));
       }
     }
-    const double high = quantile(std::move(rim), 0.99);
+    const double high = core::quantile(std::move(rim), 0.99);
     if (high > kMostTraction) {
       out.push_back(
           {.id = "units.wheel_speed",

@@ -473,14 +473,6 @@ LogTable without(const LogTable& log, const std::vector<std::string>& names) {
 
 }  // namespace
 
-double quantile(std::vector<double> values, double q) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto rank = static_cast<std::size_t>(q * static_cast<double>(values.size() - 1));
-  return core::order_statistic(std::move(values), rank);
-}
-
 LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, const ReaderCounts& reader,
                   std::size_t threads) {
   const HealthView as_stamped = make_view(stamped, robot);

@@ -159,9 +159,6 @@ struct HealthView {
   [[nodiscard]] bool one_sided(const JointView& joint) const;
 };
 
-/// The value of rank q (n − 1), rounded down, of `values` in order; 0 where there are none.
-[[nodiscard]] double quantile(std::vector<double> values, double q);
-
 /// The view of `log`, which must outlive it. Throws as examine().
 [[nodiscard]] HealthView make_view(const LogTable& log, const std::optional<Robot>& robot);
 

@@ -10,6 +10,7 @@
 #include "detector/faults/fault_rows.hpp"
 #include "tests/support/drives.hpp"
 #include "tests/support/fault_oracle.hpp"
+#include "tests/support/lost_rows.hpp"
 
 namespace wheelwright::detector::fault_rows_test {
 
@@ -226,17 +227,14 @@ TEST(FaultRows, OfBrokenSensorsAreThoseOfFalsifiedLogs) {
 double error_beside_a_loss(Shown shown, const std::vector<int>& lost, double rate) {
   const Prepared s = prepared(shown, rate);
   Simulation simulation(s.scenario);
-  LogTable table = read_all(simulation);
+  const LogTable whole = read_all(simulation);
   const auto onset_in = [](const LogTable& log) {
     return std::lower_bound(log.t.begin(), log.t.end(), kOnset - 1e-9) - log.t.begin();
   };
-  const auto onset = onset_in(table);
-  for (auto each = lost.rbegin(); each != lost.rend(); ++each) {
-    table.t.erase(table.t.begin() + onset + *each);
-    for (std::vector<double>& column : table.columns) {
-      column.erase(column.begin() + onset + *each);
-    }
-  }
+  const auto onset = onset_in(whole);
+  const LogTable table = testing_support::without_rows(whole, [&](std::size_t k) {
+    return std::ranges::find(lost, static_cast<std::ptrdiff_t>(k) - onset) != lost.end();
+  });
   const RegressorFilter exact = filter_of(s.scenario);
   filter::SignalErrors errors = exact.errors();
   errors.bridges = true;

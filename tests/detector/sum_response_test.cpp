@@ -16,6 +16,7 @@
 #include "detector/multiscale/sum_margins.hpp"
 #include "detector/multiscale/sum_response.hpp"
 #include "tests/detector/detectability.hpp"
+#include "tests/support/lost_rows.hpp"
 
 namespace wheelwright::detector::sum_response_test {
 namespace {
@@ -164,13 +165,7 @@ TEST(SumResponse, OfSpeedsThatJumpBesideLostRows) {
   const model::FaultType fault =
       model::find_fault(model::fault_catalogue(model.model, model.estimate), "encoder_scale_right");
   for (const std::vector<std::size_t>& lost : std::vector<std::vector<std::size_t>>{{}, {999}, {1001}, {999, 1001}}) {
-    LogTable healthy = whole;
-    for (auto row = lost.rbegin(); row != lost.rend(); ++row) {
-      healthy.t.erase(healthy.t.begin() + static_cast<std::ptrdiff_t>(*row));
-      for (std::vector<double>& column : healthy.columns) {
-        column.erase(column.begin() + static_cast<std::ptrdiff_t>(*row));
-      }
-    }
+    const LogTable healthy = testing_support::without_rows(whole, lost);
     const auto onset = static_cast<std::size_t>(std::ranges::lower_bound(healthy.t, whole.t[1000]) - healthy.t.begin());
     LogTable faulty = healthy;
     std::vector<double>& speed = faulty.column("omega_r");

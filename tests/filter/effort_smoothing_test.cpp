@@ -11,6 +11,8 @@
 #include "core/error.hpp"
 #include "model/differential_drive.hpp"
 #include "model/filter/row_stream.hpp"
+#include "tests/filter/wheel_measurement.hpp"
+#include "tests/support/lost_rows.hpp"
 
 namespace wheelwright::filter::effort_smoothing_test {
 namespace {
@@ -51,30 +53,12 @@ LogTable smoothed(LogTable log, double time) {
   return log;
 }
 
-LogTable without_every(LogTable log, std::size_t nth) {
-  LogTable kept = log;
-  kept.t.clear();
-  for (auto& column : kept.columns) {
-    column.clear();
-  }
-  for (std::size_t k = 0; k < log.rows(); ++k) {
-    if (k % nth != nth / 2) {
-      kept.t.push_back(log.t[k]);
-      for (std::size_t c = 0; c < 4; ++c) {
-        kept.columns[c].push_back(log.columns[c][k]);
-      }
-    }
-  }
-  return kept;
+LogTable without_every(const LogTable& log, std::size_t nth) {
+  return testing_support::without_rows(log, [&](std::size_t k) { return k % nth == nth / 2; });
 }
 
 Measurement measurement(MotionKind motion, Hold hold, Interval smoothing) {
-  Measurement m;
-  m.motion = motion;
-  m.motion_columns = motion == MotionKind::angle ? std::vector<std::string>{"phi_r", "phi_l"}
-                                                 : std::vector<std::string>{"omega_r", "omega_l"};
-  m.effort_columns = {"tau_r", "tau_l"};
-  m.hold = hold;
+  Measurement m = wheels(motion, hold);
   m.changes = model::EffortChanges::at_samples;
   m.nominal_step = kStep;
   m.smoothing = smoothing;

@@ -9,21 +9,12 @@
 #include "core/error.hpp"
 #include "model/differential_drive.hpp"
 #include "model/single_axis.hpp"
+#include "tests/filter/wheel_measurement.hpp"
 
 namespace wheelwright::filter::regressor_filter_test {
 namespace {
 
 const DifferentialDrive kRobot{.wheel_radius = 0.1, .track_width = 0.4};
-
-Measurement wheels(MotionKind motion, Hold hold = Hold::first_order) {
-  Measurement m;
-  m.motion = motion;
-  m.motion_columns = motion == MotionKind::angle ? std::vector<std::string>{"phi_r", "phi_l"}
-                                                 : std::vector<std::string>{"omega_r", "omega_l"};
-  m.effort_columns = {"tau_r", "tau_l"};
-  m.hold = hold;
-  return m;
-}
 
 // A drive in closed form: v1 = sin t + 0.4 sin 2.7t, v2 = 0.8 cos 1.3t, and the torques that (15) asks for.
 struct ClosedForm {
