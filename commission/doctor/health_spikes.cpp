@@ -50,11 +50,12 @@ void check_spikes(const HealthView& view, const ReaderCounts& reader, std::vecto
   if (reader.leaps > 0) {
     findings.push_back(leaping(
         reader.leaps,
-        fmt::format("{} of {} rows were left out, in which a speed, rate or angle leaps away and back as nothing that "
-                    "moves: the first at {}.",
-                    reader.leaps, reader.rows_read, reader.first_leap),
-        "No command but `detect` reads them: they are bridged as lost rows are. Look for what disturbs the sensor or "
-        "its bus."));
+        fmt::format(
+            "{} of {} rows were left out: a speed, rate or angle leaps away and back within them. The first is at "
+            "{}.",
+            reader.leaps, reader.rows_read, reader.first_leap),
+        "Only `detect` and `convert` read them; elsewhere they are bridged as lost rows are. Look for what disturbs "
+        "the sensor or its bus."));
   }
   for (const JointView& joint : view.joints) {
     tell_spikes(view, joint.angle_name, joint.angle, core::kAngleLeap, findings);
