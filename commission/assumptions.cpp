@@ -24,8 +24,7 @@ namespace {
 constexpr const char* kMotionInDriving = "motion_in_driving";
 constexpr const char* kSpeedFilter = "speed_filter";
 
-constexpr double kMostTurning =
-    2.0;  // on the spot over driving: as a mirrored wheel makes of a drive that hardly turns
+constexpr double kMostTurning = 1.0;  // on the spot over driving: a mirrored wheel turns the ratio round
 // Violations that a test would not have shown below these say nothing: factor on the errors of a log, s and steps of a
 // shift, shares of a length and of the efforts' gain.
 constexpr double kToldErrors = 5.0, kToldShift = 0.01, kToldSteps = 2.0, kToldLength = 0.05, kToldGain = 0.25;
@@ -373,14 +372,18 @@ Assumption wheel_directions(const Commissioning& r) {
   Assumption a{
       .id = "wheel_directions",
       .statement = "Both wheels count up, and their efforts with them, when the robot drives ahead.",
-      .declared_by = {},
+      .declared_by = "wheel_directions",
       .test =
-          "gyro or pose turn as the wheels do; without them, it turns on the spot at most twice as much as it drives"};
-  if (r.premises.turning && *r.premises.turning > kMostTurning) {
+          "gyro or pose turn as the wheels do; without them, it turns on the spot at most as much as it drives, "
+          "unless the robot file says that they were checked"};
+  if (r.premises.turning && r.model.robot.wheel_directions_checked) {
+    a.detail = "checked, says the robot file";
+  } else if (r.premises.turning && *r.premises.turning > kMostTurning) {
     a.verdict = AssumptionVerdict::fails;
     a.detail = fmt::format(
         "as its wheels count, it turns on the spot more than it drives ({:.2g} times as fast), and neither gyro nor "
-        "pose tells whether one of them counts backwards",
+        "pose tells whether one of them counts backwards; where both were seen to count up, driving ahead, the robot "
+        "file says so: `wheel_directions: checked`",
         *r.premises.turning);
   } else if (r.kinematic.status == KinematicCommissioning::Status::done) {
     a.verdict = AssumptionVerdict::holds;

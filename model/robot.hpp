@@ -159,7 +159,8 @@ struct Robot {
   PoseSource pose_source = PoseSource::automatic;
   double heading_offset = 0.0;  ///< rad, counterclockwise from the logged heading to the driving direction; readers of
                                 ///< logs add it to `theta`
-  std::map<std::string, double> limits;    ///< effort, speed, acceleration
+  bool wheel_directions_checked = false;  ///< somebody saw both wheels count up, efforts > 0, as the robot drives ahead
+  std::map<std::string, double> limits;   ///< effort, speed, acceleration
   std::optional<double> kinematic_window;  ///< s, of the kinematic residual (odometry_filter.hpp)
   std::optional<Motor> motor;
   std::vector<RobotEffect> effects;  ///< beyond the basic model, each name once

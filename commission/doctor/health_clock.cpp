@@ -318,9 +318,10 @@ std::optional<EvenClock> check_clock(const HealthView& view, std::vector<LogFind
   if (!even && (bursts || told || scatter < kClockScattersMuch)) {
     return by_stamps();
   }
-  const std::string scatters = fmt::format(
-      "{} scatter by {:.2g} s ({:.2g} % of a step) about an even clock of {:.6g} s",
-      bursts ? "Stamps of rows that come in bursts" : "Stamps", scatter * clock.step, 100.0 * scatter, clock.step);
+  const std::string scatters =
+      fmt::format("{} scatter by {:.2g} s ({:.{}f} % of a step) about an even clock of {:.6g} s",
+                  bursts ? "Stamps of rows that come in bursts" : "Stamps", scatter * clock.step, 100.0 * scatter,
+                  scatter < 0.1 ? 1 : 0, clock.step);
   LogFinding finding{.id = "time.even_clock",
                      .topic = FindingTopic::time,
                      .severity = FindingSeverity::notice,

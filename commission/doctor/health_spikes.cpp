@@ -36,8 +36,8 @@ void tell_spikes(const HealthView& view, const std::string& name, const std::vec
   const auto first = static_cast<std::size_t>(std::ranges::find(flagged, true) - flagged.begin());
   LogFinding f =
       leaping(rows,
-              fmt::format("{} leaps away and back in {} row{}, first to {:.4g} from {:.4g}: as nothing that moves.",
-                          name, rows, rows == 1 ? "" : "s", (*column)[first], (*column)[first - 1]),
+              fmt::format("{} leaps away and back in {} row{}, first to {:.4g} from {:.4g}: no wheel moves so.", name,
+                          rows, rows == 1 ? "" : "s", (*column)[first], (*column)[first - 1]),
               "Leave these rows out of the log: a value that is not meant makes bounds wide, or wrong.");
   f.columns = {name};
   set_stretches(f, view, flagged, 1.5 * view.step);

@@ -84,7 +84,7 @@ struct ReaderCounts {
   std::size_t incomplete = 0;                    ///< rows dropped: a field that is needed is empty or not finite
   std::size_t duplicates = 0;                    ///< rows dropped: the time of the row before
   std::size_t truncated = 0;                     ///< last lines cut off
-  std::size_t leaps = 0;                         ///< rows left out: a value leaps away and back as nothing that moves
+  std::size_t leaps = 0;                         ///< rows left out: a value leaps away and back
   std::string first_leap = {};                   ///< where the first of them is
   std::size_t jumps = 0;                         ///< segments that begin where a wheel angle jumps as no wheel turns
   std::size_t unwrapped = 0;                     ///< jumps of a wheel angle by a turn that were undone

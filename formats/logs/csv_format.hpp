@@ -37,7 +37,7 @@ struct CsvOptions {
   std::size_t block_rows = 4096;  ///< rows of a block, at least 1
   std::size_t min_rows = 20;      ///< usable rows that a log must have
   double heading_offset = 0.0;    ///< rad, added to `theta` (Robot::heading_offset)
-  bool leaps = true;              ///< whether rows are read in which a speed, rate or angle leaps as nothing that moves
+  bool leaps = true;              ///< whether rows are read in which a speed, rate or angle leaps away and back
   /// Whether a file may reach for others, and unpack without limit. Otherwise a log reads itself, the files of its
   /// directory that its metadata name, and the journal beside it: no path out of the directory, no link that leads out
   /// of it, no HDF5 dataset whose values stand in another file, no copy of a journal of more than 4 GiB or of a

@@ -301,7 +301,7 @@ std::vector<std::string> sentences(const LogReport& report) {
   say(report.not_finite, "row", "rows", "dropped: a value that is needed is NaN or infinite");
   say(report.uncovered, "row", "rows", "dropped: another topic that is used has no samples around their time");
   say(report.duplicates, "row", "rows", "dropped: the same time stamp as the row before");
-  say(report.leaps, "row", "rows", "left out, as if lost: a value leaps away and back as nothing that moves");
+  say(report.leaps, "row", "rows", "left out, as if lost: a value leaps away and back");
   say(report.truncated, "row", "rows", "dropped: the last line of the file is cut off");
   say(report.resets, "new segment", "new segments", "where time goes backwards");
   say(report.gaps, "new segment", "new segments",

@@ -99,7 +99,7 @@ struct LogReport {
   Occurrences not_finite;    ///< rows dropped: a used field is NaN or infinite
   Occurrences uncovered;     ///< rows dropped: another topic has no samples around their time
   Occurrences duplicates;    ///< rows dropped: the same time as the row before
-  Occurrences leaps;         ///< rows left out: a speed, rate or angle leaps as nothing that moves (core::least_leap)
+  Occurrences leaps;         ///< rows left out: a speed, rate or angle leaps away and back (core::least_leap)
   Occurrences truncated;     ///< last lines dropped that are cut off in the middle (at most one a file)
   Occurrences resets;        ///< segments begun because time went backwards
   Occurrences gaps;          ///< segments begun because a step is more than 5 × the median step

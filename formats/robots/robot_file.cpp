@@ -63,7 +63,7 @@ struct RobotReader {
                                        "heading_offset", "limits",
                                        "kinematic",      "motor",
                                        "effects",        "columns",
-                                       "clock"});
+                                       "clock",          "wheel_directions"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }
@@ -231,6 +231,8 @@ struct RobotReader {
       robot.speed_cut = cut;
     } else if (key == "pose_source") {
       robot.pose_source = static_cast<model::PoseSource>(place.choice({"auto", "independent"}));
+    } else if (key == "wheel_directions") {
+      robot.wheel_directions_checked = place.choice({"unknown", "checked"}) == 1;
     } else if (key == "heading_offset") {
       robot.heading_offset =
           place.number("an angle in rad, between -3.2 and 3.2", [](double value) { return std::abs(value) <= 3.2; });
@@ -562,6 +564,9 @@ Json to_json(const Robot& robot) {
   }
   if (robot.pose_source == model::PoseSource::independent) {
     out["pose_source"] = "independent";
+  }
+  if (robot.wheel_directions_checked) {
+    out["wheel_directions"] = "checked";
   }
   if (robot.heading_offset != 0.0) {
     out["heading_offset"] = robot.heading_offset;

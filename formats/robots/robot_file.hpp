@@ -30,7 +30,7 @@ namespace wheelwright::robots {
 ///     noise: estimate | {wheel_speed, wheel_angle, effort, position, heading, gyro: bound | estimate},
 ///     filter: auto | {order: 1 | 2, alpha, beta: 1/s}, encoder_counts_per_turn, speed_source: auto |
 ///     encoder_difference | measured, pose_source: auto | independent, heading_offset: rad,
-///     limits: {effort, speed, acceleration},
+///     wheel_directions: unknown | checked, limits: {effort, speed, acceleration},
 ///     clock: stamps | {step: s, drift: share} (core/even_clock.hpp),
 ///     motor: {torque_constant, resistance, back_emf, gear_ratio},
 ///     effects: [{effect: name, parameter: value | [lo, hi], ...}] (model/effect_law.hpp),

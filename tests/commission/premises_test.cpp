@@ -323,6 +323,10 @@ TEST(Premises, ARobotThatMostlyTurnsWithoutAGyroMayHaveAMirroredWheel) {
   const Commissioning c = commissioned(world, robot_of(world));
   EXPECT_EQ(of(c, "wheel_directions").verdict, Verdict::fails);
   EXPECT_NE(c.model.warrant, core::Warrant::guaranteed);
+  EXPECT_THAT(of(c, "wheel_directions").detail, HasSubstr("wheel_directions: checked"));
+  Robot seen = robot_of(world);
+  seen.wheel_directions_checked = true;
+  EXPECT_EQ(of(commissioned(world, seen), "wheel_directions").verdict, Verdict::not_tested);
   world.turns = false;
   EXPECT_EQ(of(commissioned(world, robot_of(world)), "wheel_directions").verdict, Verdict::not_tested);
 }

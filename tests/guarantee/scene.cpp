@@ -318,6 +318,7 @@ Scene play(const Case& c, bool exact) {
   Robot& r = s.robot;
   r.model = t.axis ? "single_axis" : "differential_drive";
   r.wheel_radius = t.axis ? 0.0 : t.radius;
+  r.wheel_directions_checked = !t.axis;
   r.track_width = t.axis ? 0.0 : t.track;
   const bool held = c.changes == Changes::at_samples || c.changes == Changes::between;
   r.hold = held != (c.broken == Broken::hold_wrong) ? Hold::zero_order : Hold::first_order;

@@ -34,6 +34,7 @@ speed_cut: {unit: 0.1, towards: below}
 clock: {step: 0.01, drift: 1e-6}
 heading_offset: -0.7
 pose_source: independent
+wheel_directions: checked
 limits:  {effort: 6.0, speed: 2}
 motor: {torque_constant: 0.0105, resistance: 3.3, back_emf: 0.0105, gear_ratio: 9.69}
 parameters: [mass, yaw_inertia]
@@ -70,6 +71,7 @@ TEST(RobotFile, ReadsEveryKey) {
             (model::SpeedFilter{.kind = model::SpeedFilterKind::mean, .time = {0.04, 0.05}, .found = true}));
   EXPECT_EQ(robot.speed_cut, (model::SpeedCut{.unit = 0.1, .down = true}));
   EXPECT_EQ(robot.heading_offset, -0.7);
+  EXPECT_TRUE(robot.wheel_directions_checked);
   ASSERT_TRUE(robot.clock);
   EXPECT_EQ(robot.clock->step, 0.01);
   EXPECT_EQ(robot.clock->drift, 1e-6);
@@ -229,6 +231,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"speed_filter: {time: [0.03, 0.02]}", "speed_filter.time: '0.02': expected seconds > 0 and at most 1"},
         Bad{"speed_cut: {towards: up}", "speed_cut.towards: 'up': expected one of zero, below"},
         Bad{"pose_source: wheels", "pose_source: 'wheels': expected one of auto, independent"},
+        Bad{"wheel_directions: forward", "wheel_directions: 'forward': expected one of unknown, checked"},
         Bad{"speed_source: encoder", "speed_source: 'encoder': expected one of auto, encoder_difference, measured"},
         Bad{"limits: {torque: 3}", "limits: unknown key 'torque': expected one of effort, speed, acceleration"},
         Bad{"footprint: {radius: 0}", "footprint.radius: '0': expected metres, > 0 and at most 100"},

@@ -45,6 +45,7 @@ TEST(RobotSchema, CoversWhatIsWritten) {
   robot.speed_cut = {.unit = 0.1};
   robot.clock = EvenClock{.step = 0.01, .drift = 1e-6};
   robot.heading_offset = 0.7;
+  robot.wheel_directions_checked = true;
   robot.limits["effort"] = 1.0;
   robot.motor.emplace();
   robot.kinematic_window = 0.5;
