@@ -33,13 +33,15 @@ constexpr const char* kHelp =
     "it, and what could have changed unseen. Before and after a repair, a winter or a new load; or two robots of one "
     "kind.\n\n"
     "Each model has the set of all parameters that its log allows. Where no one robot is in both, something has "
-    "changed, even where the intervals of every parameter overlap.";
+    "changed, even where the intervals of every parameter overlap. Where nothing is certain, best guesses that differ "
+    "by more than chance are told, and called that.";
 
 constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright compare january/model.json june/model.json --out wear\n"
     "  wheelwright compare robot_3/model.json robot_7/model.json\n\n"
-    "Exit code: 0 no change is told, 1 something has changed, 2 bad input, or models that do not compare.";
+    "Exit code: 0 no change is told, 1 something has changed (for certain, or by statistics), 2 bad input, or models "
+    "that do not compare.";
 
 std::string logs_of(const ComparedModel& model) {
   std::vector<std::string> logs;
@@ -68,7 +70,7 @@ int run(const Arguments& a) {
   const ModelComparison comparison = [&] {
     const OnlineModel first = read_model(a.before), second = read_model(a.after);
     try {
-      return commission::compare_models(first, second);
+      return commission::compare_models(first, second, before.guesses, after.guesses);
     } catch (const InvalidArgument& error) {
       throw InputError(fmt::format("{} and {}: {}", a.before.string(), a.after.string(), error.what()));
     }
@@ -94,7 +96,7 @@ int run(const Arguments& a) {
       say("wrote {} and {}\n", (a.common.out / "comparison.json").string(), (a.common.out / "report.html").string());
     }
   }
-  return comparison.changed() ? kNo : kDone;
+  return comparison.changed() || !comparison.likely().empty() ? kNo : kDone;
 }
 
 }  // namespace

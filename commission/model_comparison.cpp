@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <utility>
 #include <variant>
 
@@ -254,6 +256,30 @@ SetComparison compare_sets(const ParameterSet& before, const ParameterSet& after
   return result;
 }
 
+double GuessChange::standard_errors() const {
+  return (after.value - before.value) / std::hypot(before.standard_error, after.standard_error);
+}
+
+std::vector<GuessChange> compare_guesses(const std::vector<BestGuess>& before, const std::vector<BestGuess>& after) {
+  std::vector<GuessChange> out;
+  for (const BestGuess& first : before) {
+    const auto second = std::ranges::find_if(
+        after, [&](const BestGuess& each) { return each.quantity == first.quantity && each.unit == first.unit; });
+    if (second != after.end() && first.standard_error > 0.0 && second->standard_error > 0.0) {
+      out.push_back({first, *second});
+    }
+  }
+  return out;
+}
+
+std::vector<GuessChange> ModelComparison::likely() const {
+  std::vector<GuessChange> out;
+  std::ranges::copy_if(guesses, std::back_inserter(out), &GuessChange::told);
+  std::ranges::stable_sort(out, std::ranges::greater{},
+                           [](const GuessChange& each) { return std::abs(each.standard_errors()); });
+  return out;
+}
+
 std::vector<const SetComparison*> ModelComparison::telling() const {
   std::vector<const SetComparison*> out;
   for (const bool at_risk : {false, true}) {
@@ -266,7 +292,9 @@ std::vector<const SetComparison*> ModelComparison::telling() const {
   return out;
 }
 
-ModelComparison compare_models(const detector::OnlineModel& before, const detector::OnlineModel& after) {
+ModelComparison compare_models(const detector::OnlineModel& before, const detector::OnlineModel& after,
+                               const std::vector<BestGuess>& guesses_before,
+                               const std::vector<BestGuess>& guesses_after) {
   const CommonOrder order = common_order(before.model, after.model);
   if (const std::string what = regressor_difference(before.model, after.model, order); !what.empty()) {
     throw InvalidArgument("models that cannot be compared, since their parameters do not mean the same: different " +
@@ -287,6 +315,10 @@ ModelComparison compare_models(const detector::OnlineModel& before, const detect
     if (order.after[k] >= order.common) {
       result.only_after.push_back(after.model.parameters[k].name);
     }
+  }
+  // With another set of parameters a best guess is of another model, whatever the robot did.
+  if (result.only_before.empty() && result.only_after.empty()) {
+    result.guesses = compare_guesses(guesses_before, guesses_after);
   }
   const auto compare = [&](const ParameterSet& x, const ParameterSet& y, core::Warrant warrant,
                            std::optional<double> risk) -> SetComparison& {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Two commissioned models of one kind of robot against each other: what has changed for certain between their logs,
-/// which parameters explain it, and what could have changed unseen.
+/// which parameters explain it, what could have changed unseen, and whose best guesses differ by more than chance.
 ///
 /// Let P and Q be the sets of parameters that the two logs allow. Where their assumptions hold the true θ of the first
 /// is in P and the true θ' of the second in Q. So θ'_j − θ_j lies between min Q_j − max P_j and max Q_j − min P_j,
@@ -13,6 +13,7 @@
 /// is not proved empty; the true set of changed parameters is never among those that are refused.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -57,15 +58,45 @@ struct SetComparison {
   std::size_t sought = 0;                       ///< largest number of parameters at once that was tried
 };
 
+/// Standard errors by which two best guesses differ before this is called a change: errors of Student's kind with ten
+/// degrees of freedom exceed it in one of 10,000 logs.
+inline constexpr double kToldStandardErrors = 6.0;
+
+/// The best guess (least squares) of one log at a quantity.
+struct BestGuess {
+  std::string quantity;
+  std::string unit;
+  double value = 0.0;
+  double standard_error = 0.0;  ///< > 0
+};
+
+/// A quantity that both logs have a best guess of.
+struct GuessChange {
+  BestGuess before, after;
+
+  /// after − before, as a multiple of its standard error.
+  [[nodiscard]] double standard_errors() const;
+  /// True if they differ by more than kToldStandardErrors: a change by statistics, whose errors are those that the two
+  /// logs show of themselves. No bound on any error stands behind it.
+  [[nodiscard]] bool told() const { return std::abs(standard_errors()) > kToldStandardErrors; }
+};
+
+/// The quantities of `before`, in its order, that `after` has too, in the same unit.
+[[nodiscard]] std::vector<GuessChange> compare_guesses(const std::vector<BestGuess>& before,
+                                                       const std::vector<BestGuess>& after);
+
 /// Result of compare_models(): the sets that both models have.
 struct ModelComparison {
   std::vector<SetComparison> sets;
   std::vector<std::string> only_before, only_after;  ///< names of θ's entries that only one of the models has
+  std::vector<GuessChange> guesses{};                ///< where they are known: see compare_guesses()
 
   /// The sets that tell a change, in their order: for every noise before a stated risk.
   [[nodiscard]] std::vector<const SetComparison*> telling() const;
   /// True if something has changed: for certain, or but for the stated risk.
   [[nodiscard]] bool changed() const { return !telling().empty(); }
+  /// The quantities whose best guesses differ by more than chance, the clearest first.
+  [[nodiscard]] std::vector<GuessChange> likely() const;
 };
 
 /// What a set of parameters is compared by.
@@ -81,8 +112,11 @@ struct ParameterSet {
                                          std::size_t most_sets = 250);
 
 /// Compares all that two models have in common; a parameter that only one has (dry friction) may be anything in the
-/// other, and is no part of the sets that are returned. Throws InvalidArgument, naming what differs, unless the others
-/// mean the same in both: kind of robot, geometry, unit of the efforts; and where there are no others.
-[[nodiscard]] ModelComparison compare_models(const detector::OnlineModel& before, const detector::OnlineModel& after);
+/// other, and is no part of the sets that are returned. Best guesses are compared where both models have the same
+/// parameters. Throws InvalidArgument, naming what differs, unless the others mean the same in both: kind of robot,
+/// geometry, unit of the efforts; and where there are no others.
+[[nodiscard]] ModelComparison compare_models(const detector::OnlineModel& before, const detector::OnlineModel& after,
+                                             const std::vector<BestGuess>& guesses_before = {},
+                                             const std::vector<BestGuess>& guesses_after = {});
 
 }  // namespace wheelwright::commission

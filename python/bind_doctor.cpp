@@ -215,7 +215,8 @@ std::unique_ptr<ComparisonObject> compare(const py::object& before, const py::ob
   const auto [second, second_named] = comparable(after);
   LongWork work{py::none()};
   return work.run([&, &one = first, &two = second, &one_named = first_named, &two_named = second_named] {
-    const commission::ModelComparison comparison = commission::compare_models(one, two);
+    const commission::ModelComparison comparison =
+        commission::compare_models(one, two, one_named.guesses, two_named.guesses);
     return std::make_unique<ComparisonObject>(
         ComparisonObject{comparison.changed(), results::to_json(comparison, one_named, two_named, results::software()),
                          words::summary(comparison)});
@@ -226,7 +227,7 @@ void bind_compare(py::module_& m) {
   py::class_<ComparisonObject> compared(m, "ModelComparison", "Two models against each other: comparison.json.");
   compared.def_readonly("changed", &ComparisonObject::changed, "whether something has changed between their logs");
   result_of(compared, "comparison");
-  members_of(compared, {"message", "explanations", "sets"});
+  members_of(compared, {"message", "explanations", "sets", "guesses"});
   m.def("compare", &compare, py::arg("before"), py::arg("after"),
         "What has changed for certain between the logs of two models, and which parameters alone explain it, as "
         "`wheelwright compare` says.\n\n"

@@ -43,6 +43,48 @@ Json of_model(const ComparedModel& model) {
   return {{"file", model.file}, {"robot", model.robot}, {"software", model.software}, {"logs", model.logs}};
 }
 
+Json of_guess(const commission::GuessChange& each) {
+  return {{"quantity", each.before.quantity},
+          {"unit", each.before.unit},
+          {"before", {{"estimate", each.before.value}, {"standard_error", each.before.standard_error}}},
+          {"after", {{"estimate", each.after.value}, {"standard_error", each.after.standard_error}}},
+          {"standard_errors", each.standard_errors()},
+          {"told", each.told()}};
+}
+
+// Nothing where the log gave no best guess, or none with a standard error.
+void take_guess(const files::JsonPlace& place, const std::string& quantity, std::vector<commission::BestGuess>& out) {
+  const auto known = [&](const char* key) { return place.has(key) && !place.at(key).is_null(); };
+  if (known("estimate") && known("standard_error")) {
+    out.push_back({.quantity = quantity,
+                   .unit = place.at("unit").text(),
+                   .value = place.at("estimate").number(),
+                   .standard_error = place.at("standard_error").number()});
+  }
+}
+
+std::vector<commission::BestGuess> guesses_of(const files::JsonPlace& root) {
+  std::vector<commission::BestGuess> out;
+  if (root.has("physical") && !root.at("physical").is_null()) {
+    const files::JsonPlace physical = root.at("physical");
+    for (const std::string& name : physical.keys()) {
+      take_guess(physical.at(name), name, out);
+    }
+  } else if (root.has("parameters")) {
+    const files::JsonPlace parameters = root.at("parameters");
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+      take_guess(parameters.at(k), parameters.at(k).at("name").text(), out);
+    }
+  }
+  if (root.has("kinematic") && !root.at("kinematic").is_null() && root.at("kinematic").has("parameters")) {
+    const files::JsonPlace wheels = root.at("kinematic").at("parameters");
+    for (std::size_t k = 0; k < wheels.size(); ++k) {
+      take_guess(wheels.at(k), wheels.at(k).at("name").text(), out);
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 ComparedModel compared_model(const std::string& file) {
@@ -57,12 +99,16 @@ ComparedModel compared_model(const std::string& file) {
       model.logs.push_back({{"path", logs.at(k).at("path").text()}, {"hash", logs.at(k).at("hash").text()}});
     }
   }
+  model.guesses = guesses_of(root);
   return model;
 }
 
 Json to_json(const commission::ModelComparison& comparison, const ComparedModel& before, const ComparedModel& after,
              const std::string& software) {
-  Json sets = Json::array();
+  Json sets = Json::array(), guesses = Json::array();
+  for (const commission::GuessChange& each : comparison.guesses) {
+    guesses.push_back(of_guess(each));
+  }
   for (const commission::SetComparison& each : comparison.sets) {
     sets.push_back(of_set(each));
   }
@@ -73,7 +119,8 @@ Json to_json(const commission::ModelComparison& comparison, const ComparedModel&
                {"changed", comparison.changed()},
                {"message", words::verdict(comparison)},
                {"explanations", words::explanations(comparison)},
-               {"sets", std::move(sets)}};
+               {"sets", std::move(sets)},
+               {"guesses", std::move(guesses)}};
   if (const std::string rest = words::not_compared(comparison); !rest.empty()) {
     json["not_compared"] = rest;
   }

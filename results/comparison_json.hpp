@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "commission/model_comparison.hpp"
 #include "formats/files/json.hpp"
@@ -16,6 +17,8 @@ struct ComparedModel {
   std::string robot;
   std::string software;
   Json logs = Json::array();  ///< path and hash of each, as model.json has them
+  /// Of θ's entries, as the physical quantities behind them where the model has these, and of the wheels.
+  std::vector<commission::BestGuess> guesses{};
 };
 
 /// What model.json at `file` says of itself. Throws InputError when it is no such file.

@@ -117,9 +117,9 @@ Json population_json(const study::FleetResult& fleet) {
   return list;
 }
 
-Json outside_json(const study::FleetResult& fleet) {
+Json outside_json(const study::FleetResult& fleet, const std::vector<study::RobotOutside>& robots) {
   Json list = Json::array();
-  for (const study::RobotOutside& o : fleet.population.outside) {
+  for (const study::RobotOutside& o : robots) {
     list.push_back({{"robot", fleet.table.robots[o.robot]},
                     {"parameter", fleet.table.columns[o.column].name},
                     {"estimate", o.value},
@@ -281,7 +281,8 @@ Json to_json(const study::FleetResult& fleet, const std::string& list, const std
   json["logs"] = fleet.logs;
   json["seconds"] = fleet.seconds;
   json["population"] = population_json(fleet);
-  json["outside"] = outside_json(fleet);
+  json["outside"] = outside_json(fleet, fleet.population.outside);
+  json["odd"] = outside_json(fleet, fleet.population.odd);
   json["drift"] = drift_json(fleet);
   json["alarms"] = Json::array();
   for (const study::FleetAlarm& a : fleet.alarms) {

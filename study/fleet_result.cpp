@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/statistics.hpp"
+#include "core/words.hpp"
 #include "study/population.hpp"
 
 namespace wheelwright::study {
@@ -250,6 +251,62 @@ void take_check(FleetResult& fleet, const CheckRecord& check, std::size_t robot)
   }
 }
 
+constexpr std::size_t kNamed = 3;  // robots on the first line
+
+std::string spaced_name(const FleetColumn& column) {
+  std::string name = column.name;
+  std::ranges::replace(name, '_', ' ');
+  return name;
+}
+
+// "amr_7: coulomb 0.76 N·m, 68 % above the others".
+std::string odd_words(const FleetResult& fleet, const RobotOutside& odd) {
+  const FleetColumn& column = fleet.table.columns[odd.column];
+  const double centre = fleet.population.parameters[odd.column].fit.centre, off = odd.value - centre;
+  const std::string where = off > 0.0 ? "above" : "below";
+  const std::string by = std::abs(off) < 10.0 * std::abs(centre)
+                             ? fmt::format("{:.2g} % {} the others", 100.0 * std::abs(off / centre), where)
+                             : fmt::format("{} the others at {:.3g}", where, centre);
+  return fmt::format("{}: {} {:.3g}{}, {}", fleet.table.robots[odd.robot], spaced_name(column), odd.value,
+                     column.unit == "1" ? "" : " " + column.unit, by);
+}
+
+// What is odd, robot by robot: outside first, then drifting, alarmed, failed; odd ones only where there is nothing
+// else.
+std::vector<std::string> odd_robots(const FleetResult& fleet) {
+  std::vector<std::string> out;
+  std::set<std::size_t> told;
+  const auto tell = [&](std::size_t robot, const auto& text) {
+    if (told.insert(robot).second) {
+      out.push_back(text());
+    }
+  };
+  for (const RobotOutside& each : fleet.population.outside) {
+    tell(each.robot, [&] { return odd_words(fleet, each); });
+  }
+  for (const ParameterDrift& each : fleet.drift) {
+    if (each.drifts(fleet.drift_level)) {
+      tell(each.robot, [&] {
+        return fmt::format("{}: {} drifts", fleet.table.robots[each.robot],
+                           spaced_name(fleet.table.columns[each.column]));
+      });
+    }
+  }
+  for (const FleetAlarm& each : fleet.alarms) {
+    tell(each.robot, [&] { return fmt::format("{}: alarms in {}", fleet.table.robots[each.robot], each.log); });
+  }
+  for (const FleetFinding& each : fleet.failed) {
+    tell(each.robot, [&] { return fmt::format("{}: no model", fleet.table.robots[each.robot]); });
+  }
+  for (const RobotOutside& each : fleet.population.odd) {
+    tell(each.robot, [&] {
+      return fmt::format("{} (by chance in {:.0f} of 100 fleets)", odd_words(fleet, each),
+                         std::ceil(100.0 * each.adjusted_p));
+    });
+  }
+  return out;
+}
+
 std::string robots(std::size_t n) { return fmt::format("{} robot{}", n, n == 1 ? "" : "s"); }
 
 }  // namespace
@@ -325,6 +382,12 @@ std::vector<std::string> sentences(const FleetResult& fleet) {
   const std::size_t all = fleet.table.robots.size();
   const std::size_t partial = fleet.count(RobotStatus::partial);
   std::vector<std::string> out;
+  if (std::vector<std::string> odd = odd_robots(fleet); !odd.empty()) {
+    const std::size_t more = odd.size() > kNamed ? odd.size() - kNamed : 0;
+    odd.resize(odd.size() - more);
+    out.push_back(
+        fmt::format("Look at {}{}.", core::listed(odd, "; "), more == 0 ? "" : fmt::format("; and {} more", more)));
+  }
   out.push_back(fmt::format("{} of {} were commissioned{}", fleet.count(RobotStatus::commissioned) + partial,
                             robots(all), partial == 0 ? "." : fmt::format(", {} of them in part.", partial)));
   const std::size_t contradicted = fleet.count(RobotStatus::contradicted), nothing = fleet.count(RobotStatus::nothing),

@@ -207,6 +207,7 @@ Shown shown_of(const FleetColumn& column) {
 Population describe_population(const FleetTable& table, const PopulationOptions& options) {
   check::that(options.level > 0.0 && options.level < 1.0, "level", "in (0, 1)");
   check::that(options.central > 0.0 && options.central < 1.0, "central", "in (0, 1)");
+  check::that(options.odd_level > 0.0 && options.odd_level < 1.0, "odd_level", "in (0, 1)");
   check::that(options.fewest >= 4, "fewest", "at least 4");
   Population population;
   std::vector<RobotOutside> candidates;
@@ -233,7 +234,7 @@ Population describe_population(const FleetTable& table, const PopulationOptions&
       const double t = sd > 0.0 ? (shown.values[i] - others.centre) / sd : 0.0;
       const double own = sd > 0.0 ? s * s / (sd * sd) : 0.0;
       p.push_back(two_sided(t, 1.0 / (1.0 / others.freedom + own * own / shown.entries[i]->freedom)));
-      if (p.back() <= options.level) {
+      if (p.back() <= std::max(options.level, options.odd_level)) {
         which.push_back(p.size() - 1);
         candidates.push_back(
             {.robot = shown.entries[i]->robot, .column = j, .value = shown.values[i], .deviations = t, .p = p.back()});
@@ -244,23 +245,29 @@ Population describe_population(const FleetTable& table, const PopulationOptions&
   const std::vector<double> adjusted = core::holm(p);
   std::map<std::size_t, std::set<std::size_t>> strangers;  // of each column
   for (std::size_t k = 0; k < candidates.size(); ++k) {
-    if (adjusted[which[k]] > options.level) {
+    candidates[k].adjusted_p = adjusted[which[k]];
+    if (candidates[k].adjusted_p > options.level) {
+      if (candidates[k].adjusted_p <= options.odd_level) {
+        population.odd.push_back(candidates[k]);
+      }
       continue;
     }
     population.outside.push_back(candidates[k]);
-    population.outside.back().adjusted_p = adjusted[which[k]];
     strangers[candidates[k].column].insert(candidates[k].robot);
   }
-  for (RobotOutside& outside : population.outside) {
-    const FleetColumn& column = table.columns[outside.column];
-    const auto entry = std::lower_bound(column.entries.begin(), column.entries.end(), outside.robot,
-                                        [](const FleetEntry& e, std::size_t robot) { return e.robot < robot; });
-    outside.certainly_beyond = certainly_beyond(column, *entry, strangers[outside.column]);
-    outside.certain = outside.certainly_beyond >= 0.5 * (1.0 + options.central);
+  for (std::vector<RobotOutside>* const list : {&population.outside, &population.odd}) {
+    for (RobotOutside& robot : *list) {
+      const FleetColumn& column = table.columns[robot.column];
+      const auto entry = std::lower_bound(column.entries.begin(), column.entries.end(), robot.robot,
+                                          [](const FleetEntry& e, std::size_t number) { return e.robot < number; });
+      robot.certainly_beyond = certainly_beyond(column, *entry, strangers[robot.column]);
+      robot.certain = robot.certainly_beyond >= 0.5 * (1.0 + options.central);
+    }
+    std::stable_sort(list->begin(), list->end(), [](const auto& a, const auto& b) {
+      return a.adjusted_p != b.adjusted_p ? a.adjusted_p < b.adjusted_p
+                                          : std::abs(a.deviations) > std::abs(b.deviations);
+    });
   }
-  std::stable_sort(population.outside.begin(), population.outside.end(), [](const auto& a, const auto& b) {
-    return a.adjusted_p != b.adjusted_p ? a.adjusted_p < b.adjusted_p : std::abs(a.deviations) > std::abs(b.deviations);
-  });
   return population;
 }
 

@@ -165,6 +165,7 @@ struct PopulationOptions {
   double level = 0.05;     ///< probability that any robot of a homogeneous fleet is called outside
   std::size_t fewest = 5;  ///< robots that a parameter needs for its population to be looked at
   double central = 0.9;    ///< share of the others that the certain statement is about
+  double odd_level = 0.2;  ///< probability that any robot of a homogeneous fleet is called odd, or outside
 };
 
 /// One parameter over the fleet.
@@ -195,6 +196,7 @@ struct RobotOutside {
 struct Population {
   std::vector<ParameterPopulation> parameters{};  ///< one for each column of the table
   std::vector<RobotOutside> outside{};            ///< smallest adjusted p first
+  std::vector<RobotOutside> odd{};                ///< likewise: robots that are not outside, but odd
   std::size_t tests = 0;                          ///< pairs of robot and parameter
 };
 
@@ -206,7 +208,8 @@ struct Population {
 ///
 /// which for a robot like the others follows about Student's t (normal θ and errors) of ν degrees of freedom, those of
 /// the estimated variances in it: 1/ν = 1/(freedom of the others' random effects) + q²/(those of s), q = s²/(s² + τ² +
-/// s_μ²). It is outside where its p, adjusted by Holm's method over all robots and parameters, is at most `level`. The
+/// s_μ²). It is outside where its p, adjusted by Holm's method over all robots and parameters, is at most `level`, and
+/// odd where that is at most `odd_level`: in a small fleet hardly anything is unlikely enough for the former. The
 /// certain statement needs no distribution, only the noise bounds. Throws InvalidArgument for a level or share outside
 /// (0, 1) or fewest < 4.
 [[nodiscard]] Population describe_population(const FleetTable& table, const PopulationOptions& options = {});

@@ -63,12 +63,30 @@ std::string set_section(const SetComparison& sets) {
              "certain.");
 }
 
+std::string guesses_section(const std::vector<commission::GuessChange>& guesses) {
+  std::vector<std::vector<Cell>> rows;
+  for (const commission::GuessChange& each : guesses) {
+    const auto cell = [&](const commission::BestGuess& guess) {
+      const double reach = 2.0 * guess.standard_error;
+      return numeric(escape(beside(guess.value, guess.value - reach, guess.value + reach) + " ± " + number(reach, 2)));
+    };
+    const std::string unit = unit_of(each.before.unit);
+    rows.push_back({escape(spaced(each.before.quantity) + (unit.empty() ? "" : ", " + unit)), cell(each.before),
+                    cell(each.after), numeric(number(each.standard_errors(), 2)),
+                    Cell(each.told() ? "more than chance" : "")});
+  }
+  return table({"parameter", numeric("before"), numeric("after"), numeric("change, standard errors"), ""}, rows) +
+         note(fmt::format("By least squares, ± two standard errors. A change is told beyond {:.0f} of them: by "
+                          "statistics, not for certain.",
+                          commission::kToldStandardErrors));
+}
+
 }  // namespace
 
 std::string comparison_report(const ModelComparison& comparison, const ComparisonContext& context) {
   PageContent content;
   content.title = context.title;
-  content.status = comparison.changed() ? "caution" : "good";
+  content.status = comparison.changed() || !comparison.likely().empty() ? "caution" : "good";
   content.verdict = core::capital(words::verdict(comparison)) + ".";
   content.sentences = words::explanations(comparison);
   if (const std::string rest = words::not_compared(comparison); !rest.empty()) {
@@ -80,6 +98,9 @@ std::string comparison_report(const ModelComparison& comparison, const Compariso
   int number = 0;
   for (const SetComparison& sets : comparison.sets) {
     content.sections.push_back({fmt::format("set_{}", ++number), core::capital(set_words(sets)), set_section(sets)});
+  }
+  if (!comparison.guesses.empty()) {
+    content.sections.push_back({"guesses", "Best guesses", guesses_section(comparison.guesses)});
   }
   content.sections.push_back({"files", "Files", definitions({{"before", context.before}, {"after", context.after}})});
   content.software = context.software;

@@ -2,6 +2,7 @@
 #include "results/words/comparison_words.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -12,6 +13,7 @@ namespace wheelwright::words {
 namespace {
 
 using commission::ChangeExplanation;
+using commission::GuessChange;
 using commission::ModelComparison;
 using commission::ParameterChange;
 using commission::SetComparison;
@@ -51,8 +53,21 @@ std::string set_words(const SetComparison& sets) {
                                : std::string(core::warrant_word(sets.warrant)));
 }
 
+std::string guess_words(const GuessChange& change) {
+  const auto spread = [](const commission::BestGuess& guess) {
+    const double reach = 2.0 * guess.standard_error;
+    return fmt::format("{} ± {}", beside(guess.value, guess.value - reach, guess.value + reach), number(reach, 2));
+  };
+  return fmt::format("{} {} → {} ({:.0f} standard errors)", spaced(change.before.quantity), spread(change.before),
+                     with_unit(spread(change.after), unit_of(change.before.unit)), std::abs(change.standard_errors()));
+}
+
 std::string verdict(const ModelComparison& comparison) {
   const std::vector<const SetComparison*> telling = comparison.telling();
+  const std::vector<GuessChange> likely = comparison.likely();
+  if (telling.empty() && !likely.empty()) {
+    return fmt::format("a change is likely, but not certain: {}", guess_words(likely.front()));
+  }
   if (telling.empty()) {
     return "no change is told: one robot explains both logs";
   }
@@ -75,6 +90,13 @@ std::string verdict(const ModelComparison& comparison) {
 
 std::vector<std::string> explanations(const ModelComparison& comparison) {
   std::vector<std::string> out;
+  if (!comparison.likely().empty()) {
+    std::vector<std::string> parts;
+    for (const GuessChange& each : comparison.likely()) {
+      parts.push_back(guess_words(each));
+    }
+    out.push_back(fmt::format("Best guesses differ by more than chance: {}.", core::enumerated(parts)));
+  }
   for (const SetComparison* sets : comparison.telling()) {
     const std::string promise = sets->risk ? fmt::format(" (at a risk of {:.3g})", *sets->risk) : "";
     if (sets->explanations.empty()) {

@@ -20,6 +20,9 @@ namespace wheelwright::words {
 /// The answer in one sentence.
 [[nodiscard]] std::string verdict(const commission::ModelComparison& comparison);
 
+/// "coulomb 0.759 ± 0.023 → 0.447 ± 0.016 N·m (22 standard errors)", with two standard errors behind the ±.
+[[nodiscard]] std::string guess_words(const commission::GuessChange& change);
+
 /// "mass, kg".
 [[nodiscard]] std::string quantity_words(const commission::ParameterChange& parameter);
 

@@ -161,5 +161,20 @@ TEST(ModelComparison, NothingTrueIsRefusedOnRandomSets) {
   EXPECT_GT(named, 50);
 }
 
+TEST(ModelComparison, BestGuessesAreToldFromSixStandardErrorsOn) {
+  const std::vector<BestGuess> before{
+      {"mass", "kg", 24.0, 0.03}, {"coulomb", "N·m", 0.759, 0.0105}, {"x", "m", 1.0, 0.1}};
+  const std::vector<BestGuess> after{
+      {"coulomb", "N·m", 0.447, 0.005}, {"mass", "kg", 24.2, 0.04}, {"x", "mm", 1e3, 0.1}};
+  ModelComparison comparison;
+  comparison.guesses = compare_guesses(before, after);
+  ASSERT_THAT(comparison.guesses, SizeIs(2)) << "what is in another unit is another quantity";
+  EXPECT_NEAR(comparison.guesses[0].standard_errors(), 4.0, 1e-9);
+  EXPECT_NEAR(comparison.guesses[1].standard_errors(), -0.312 / std::hypot(0.0105, 0.005), 1e-9);
+  ASSERT_THAT(comparison.likely(), SizeIs(1));
+  EXPECT_EQ(comparison.likely().front().before.quantity, "coulomb");
+  EXPECT_FALSE(comparison.changed()) << "for certain";
+}
+
 }  // namespace
 }  // namespace wheelwright::commission::model_comparison_test

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.hpp"
+#include "study/fleet_result.hpp"
 #include "tests/study/fleets.hpp"
 
 namespace wheelwright::study::population_test {
@@ -42,13 +43,18 @@ TEST(Population, CallsNobodyOutsideInFleetsThatAreAlike) {
   for (const Case& c : {Case{5, 1.0, 0.3, 400}, Case{8, 1.0, 1.0, 400}, Case{20, 1.0, 0.1, 150},
                         Case{20, 0.0, 1.0, 150}, Case{60, 1.0, 0.5, 30}, Case{300, 1.0, 0.5, 100}}) {
     Random random(c.robots + static_cast<std::size_t>(100.0 * c.error));
-    int wrong = 0;
+    int wrong = 0, odd = 0;
     for (int k = 0; k < c.fleets; ++k) {
-      wrong += describe_population(alike(c.robots, 4, c.spread, c.error, random)).outside.empty() ? 0 : 1;
+      const Population population = describe_population(alike(c.robots, 4, c.spread, c.error, random));
+      wrong += population.outside.empty() ? 0 : 1;
+      odd += population.outside.empty() && population.odd.empty() ? 0 : 1;
     }
-    const double allowed = 0.05 * c.fleets + 4.0 * std::sqrt(0.05 * 0.95 * c.fleets);
+    const auto allowed = [&](double level) {
+      return level * c.fleets + 4.0 * std::sqrt(level * (1.0 - level) * c.fleets);
+    };
     RecordProperty("fleets_with_false_flags_" + std::to_string(c.robots), wrong);
-    EXPECT_LE(wrong, allowed) << c.robots << " robots, spread " << c.spread << ", error " << c.error;
+    EXPECT_LE(wrong, allowed(0.05)) << c.robots << " robots, spread " << c.spread << ", error " << c.error;
+    EXPECT_LE(odd, allowed(0.2)) << c.robots << " robots, spread " << c.spread << ", error " << c.error;
   }
 }
 
@@ -69,6 +75,26 @@ TEST(Population, FindsStrangersThatWouldHideOneAnother) {
     EXPECT_LE(robot.adjusted_p, 0.05);
   }
   EXPECT_EQ(population.tests, 66U);
+}
+
+// Five others hardly tell their own spread, so that ten times it is not beyond all chance. It is named all the same.
+TEST(Population, OfSixRobotsTheOneTenSpreadsAwayIsTheFirstThatIsNamed) {
+  Random random(4);
+  int named = 0, outside = 0;
+  for (int k = 0; k < 100; ++k) {
+    FleetResult fleet;
+    for (int i = 0; i < 6; ++i) {
+      take(fleet, drawn_record("robot_" + std::to_string(i),
+                               {i == 3 ? 30.0 : 20.0 + random.normal(), 20.0 + random.normal()}, 0.2, random));
+    }
+    judge_fleet(fleet);
+    outside += fleet.population.outside.empty() ? 0 : 1;
+    const std::string first = sentences(fleet).front();
+    named +=
+        first.starts_with("Look at robot_3: mass ") && first.find(" % above the others") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_GE(named, 80);
+  EXPECT_LT(outside, named) << "the test would show nothing";
 }
 
 TEST(Population, AStrangerWithWideBoundsIsNotCertain) {
