@@ -54,8 +54,7 @@ Json of_guess(const commission::GuessChange& each) {
 
 // Nothing where the log gave no best guess, or none with a standard error.
 void take_guess(const files::JsonPlace& place, const std::string& quantity, std::vector<commission::BestGuess>& out) {
-  const auto known = [&](const char* key) { return place.has(key) && !place.at(key).is_null(); };
-  if (known("estimate") && known("standard_error")) {
+  if (place.has("estimate") && place.has("standard_error")) {
     out.push_back({.quantity = quantity,
                    .unit = place.at("unit").text(),
                    .value = place.at("estimate").number(),
@@ -65,7 +64,7 @@ void take_guess(const files::JsonPlace& place, const std::string& quantity, std:
 
 std::vector<commission::BestGuess> guesses_of(const files::JsonPlace& root) {
   std::vector<commission::BestGuess> out;
-  if (root.has("physical") && !root.at("physical").is_null()) {
+  if (root.has("physical")) {
     const files::JsonPlace physical = root.at("physical");
     for (const std::string& name : physical.keys()) {
       take_guess(physical.at(name), name, out);
@@ -76,7 +75,7 @@ std::vector<commission::BestGuess> guesses_of(const files::JsonPlace& root) {
       take_guess(parameters.at(k), parameters.at(k).at("name").text(), out);
     }
   }
-  if (root.has("kinematic") && !root.at("kinematic").is_null() && root.at("kinematic").has("parameters")) {
+  if (root.has("kinematic") && root.at("kinematic").has("parameters")) {
     const files::JsonPlace wheels = root.at("kinematic").at("parameters");
     for (std::size_t k = 0; k < wheels.size(); ++k) {
       take_guess(wheels.at(k), wheels.at(k).at("name").text(), out);

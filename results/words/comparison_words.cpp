@@ -89,13 +89,15 @@ std::string verdict(const ModelComparison& comparison) {
 }
 
 std::vector<std::string> explanations(const ModelComparison& comparison) {
-  std::vector<std::string> out;
-  if (!comparison.likely().empty()) {
-    std::vector<std::string> parts;
-    for (const GuessChange& each : comparison.likely()) {
-      parts.push_back(guess_words(each));
-    }
-    out.push_back(fmt::format("Best guesses differ by more than chance: {}.", core::enumerated(parts)));
+  std::vector<std::string> out, guesses;
+  for (const GuessChange& each : comparison.likely()) {
+    guesses.push_back(guess_words(each));
+  }
+  if (!comparison.changed() && !guesses.empty()) {
+    guesses.erase(guesses.begin());  // the verdict has it
+  }
+  if (!guesses.empty()) {
+    out.push_back(fmt::format("Best guesses differ by more than chance: {}.", core::enumerated(guesses)));
   }
   for (const SetComparison* sets : comparison.telling()) {
     const std::string promise = sets->risk ? fmt::format(" (at a risk of {:.3g})", *sets->risk) : "";

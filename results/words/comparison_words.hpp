@@ -26,7 +26,8 @@ namespace wheelwright::words {
 /// "mass, kg".
 [[nodiscard]] std::string quantity_words(const commission::ParameterChange& parameter);
 
-/// What explains the change, a sentence for each explanation of each set that tells one; empty where none does.
+/// Best guesses that differ by more than chance, beyond the one in verdict(), and what explains the change: a sentence
+/// for each explanation of each set that tells one. Empty where nothing is told.
 [[nodiscard]] std::vector<std::string> explanations(const commission::ModelComparison& comparison);
 
 /// What only one of the models has, in sentences, and that a change of the others may be what the other model lacks;

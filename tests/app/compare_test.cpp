@@ -88,6 +88,27 @@ TEST_F(Compare, ALoadIsTold) {
   EXPECT_THAT(run("compare loaded/model.json empty/model.json").out, HasSubstr("less) alone explains it"));
 }
 
+// 7 % more friction, of which no bound is sure.
+TEST_F(Compare, WhatIsLikelyButNotCertainIsToldAsThat) {
+  commission("before", 5);
+  commission("again", 7);
+  commission("after", 6, "viscous_linear: 4.0", "viscous_linear: 4.3");
+  const Json said = compared("before", "after", 1);
+  EXPECT_FALSE(said.at("changed").get<bool>()) << "for certain";
+  EXPECT_THAT(said.at("message").get<std::string>(),
+              AllOf(HasSubstr("a change is likely, but not certain: viscous linear"), HasSubstr("standard errors")));
+  int told = 0;
+  for (const Json& guess : said.at("guesses")) {
+    told += guess.at("told").get<bool>() ? 1 : 0;
+    EXPECT_EQ(guess.at("told").get<bool>(), guess.at("quantity") == "viscous_linear") << guess.dump();
+  }
+  EXPECT_EQ(told, 1);
+  const Outcome page = run("compare before/model.json after/model.json --out page");
+  EXPECT_EQ(page.code, 1);
+  EXPECT_NE(bytes(path("page/report.html")).find("A change is likely, but not certain"), std::string::npos);
+  EXPECT_THAT(compared("before", "again", 0).at("message").get<std::string>(), HasSubstr("no change is told"));
+}
+
 TEST_F(Compare, WornTyresAreToldByThePose) {
   commission("new", 5);
   commission("worn", 6, "duration: 40",
