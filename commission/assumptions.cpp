@@ -120,9 +120,14 @@ Assumption assumed_delay(const Commissioning& r) {
     a.detail = latency->sentence;
   } else if (r.effort_shift) {
     const bool told = r.effort_shift_told <= std::max(kToldShift, kToldSteps * r.survey.median_step);
-    a.verdict = told ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
-    a.detail = fmt::format("the best shift is {:.2g} s; one of {:.2g} s beyond what is declared would have shown",
-                           *r.effort_shift, r.effort_shift_told);
+    const double beyond =
+        EffortTiming{.delay = *r.effort_shift, .allowed = allowed_shift(r.model.measurement, r.survey.median_step)}
+            .beyond();
+    const bool within = beyond <= kLeastShift * r.survey.median_step;
+    a.verdict = told && within ? AssumptionVerdict::holds : AssumptionVerdict::not_tested;
+    a.detail = fmt::format("the best shift is {:.2g} s{}; one of {:.2g} s beyond what is declared would have shown",
+                           *r.effort_shift, within ? "" : fmt::format(", {:.2g} s beyond what is declared", beyond),
+                           r.effort_shift_told);
   } else {
     a.detail = "the log tells no shift";
   }

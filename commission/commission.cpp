@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <functional>
 #include <limits>
 #include <memory>
 
@@ -19,9 +20,9 @@
 #include "commission/fit.hpp"
 #include "commission/noise_budget.hpp"
 #include "commission/premises.hpp"
+#include "commission/refined_set.hpp"
 #include "commission/setting.hpp"
 #include "commission/setting_rows.hpp"
-#include "commission/thrust_bound.hpp"
 #include "commission/two_walks.hpp"
 #include "core/check.hpp"
 #include "core/limits.hpp"
@@ -53,89 +54,15 @@ std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const id
 SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise, RowUse use) {
   SignalErrors errors = s.declared;
   errors.bridges = errors.bridges || use == RowUse::driving;
+  // Noise that is learnt is that of one moment of change; the truth may have another. Thresholds learn from residuals,
+  // which any moment is in.
+  errors.held_between = use == RowUse::learning && !s.noise_complete && s.measurement.hold == Hold::zero_order &&
+                        s.measurement.changes == model::EffortChanges::between;
   errors.output.resize(static_cast<Eigen::Index>(noise.size()));
   for (std::size_t i = 0; i < noise.size(); ++i) {
     errors.output[static_cast<Eigen::Index>(i)] = use == RowUse::learning ? noise[i].learning : noise[i].bound;
   }
   return errors;
-}
-
-// What bounds the motion between samples: a first set stands on the limit of the accelerations, the next ones on the
-// dynamics with the parameters of the set before, as long as that brings something.
-struct Bounded {
-  bounds::OutlierResult result;
-  std::vector<EarlierSet> earlier;
-  filter::MotionBound learning;  // of the rows that the set is made of
-  filter::MotionBound driving;   // for driving to come: what was seen in this log is no limit of that
-  double raised = 1.0;           // factor on an estimated noise bound without which the prior box explains nothing
-};
-
-bounds::OutlierResult set_of(LogSource& log, const Setting& s, Part part, const SignalErrors& errors,
-                             std::size_t outliers) {
-  TorqueRows rows = make_rows(log, s, errors);
-  FoldedSource folded(rows, part, s.survey.rows, s.folds);
-  if (outliers > 0) {
-    return bounds::feasible_set_with_outliers(folded, s.prior, {.most = outliers, .set = {}});
-  }
-  bounds::OutlierResult result;
-  result.set = feasible_set(folded, s.prior);
-  return result;
-}
-
-double widths(const Box& hull, const Box& unit) {
-  double sum = 0.0;
-  for (std::size_t j = 0; j < hull.dimension(); ++j) {
-    const double width = unit.sides[j].upper - unit.sides[j].lower;
-    sum += width > 0.0 ? (hull.sides[j].upper - hull.sides[j].lower) / width : 0.0;
-  }
-  return sum / static_cast<double>(hull.dimension());
-}
-
-Bounded refined_set(LogSource& log, const Setting& s, Part part, SignalErrors errors, std::size_t outliers) {
-  constexpr int kPasses = 4;
-  constexpr double kWorthAnother = 0.98;  // of the widths
-  Bounded best;
-  best.learning = best.driving = errors.motion;
-  // Outliers are outside of all bounds, in pairs of steps too.
-  const filter::MotionBound thrust =
-      outliers > 0 ? filter::MotionBound{} : thrust_bound(log, s.model, s.measurement, errors);
-  const bool thrusts = thrust.mobility.size() > 0;
-  SignalErrors first = errors;
-  sharpen(first.motion, thrust, s.prior);
-  best.learning = first.motion;
-  best.result = set_of(log, s, part, first, outliers);
-  const bool declared = s.robot.limits.contains("acceleration");
-  for (int pass = 1; pass < kPasses && errors.between_samples; ++pass) {
-    if (best.result.set.status != FeasibleSet::Status::nonempty) {
-      return best;
-    }
-    filter::MotionBound bound = filter::motion_bound(s.model, best.result.set.hull.sides);
-    const bool heavy = bound.mobility.size() > 0;
-    if (!heavy && !thrusts) {
-      return best;
-    }
-    bound.effort = errors.motion.effort;
-    if (heavy) {
-      best.driving = bound;
-      if (declared) {
-        best.driving.limit = errors.motion.limit;
-      }
-    }
-    sharpen(bound, thrust, best.result.set.hull);
-    bound.limit = errors.motion.limit;
-    SignalErrors sharper = errors;
-    sharper.motion = bound;
-    bounds::OutlierResult next = set_of(log, s, part, sharper, outliers);
-    const bool better =
-        next.set.status != FeasibleSet::Status::nonempty || widths(next.set.hull, best.result.set.hull) < kWorthAnother;
-    best.earlier.push_back({std::move(best.result.set), std::move(best.result.dropped)});
-    best.result = std::move(next);
-    best.learning = bound;
-    if (!better) {
-      return best;
-    }
-  }
-  return best;
 }
 
 // With noise that is estimated a column of noise alone would be taken for motion without noise: its parameter would be
@@ -146,14 +73,14 @@ std::vector<bool> left_out(const Setting& s, const Fit& fit) {
 }
 
 // The feasible set; where estimated bounds are too small for the prior box (θ̂ may lie outside it), they are raised.
-Bounded bounded_set(LogSource& log, const Setting& setting, Part part, const Fit& fit, double risk,
-                    std::vector<OutputNoise>& noise, std::size_t outliers, std::vector<std::string>& notes) {
+RefinedSet bounded_set(LogSource& log, const Setting& setting, Part part, const Fit& fit, double risk,
+                       std::vector<OutputNoise>& noise, std::size_t outliers, std::vector<std::string>& notes) {
   Setting s = setting;
   s.model = without_columns(std::move(s.model), left_out(setting, fit));
   const auto set_with = [&](const std::vector<OutputNoise>& bounds) {
     return refined_set(log, s, part, with_noise(s, bounds, RowUse::learning), outliers);
   };
-  const auto told = [&](Bounded bounded) {
+  const auto told = [&](RefinedSet bounded) {
     if (!bounded.result.dropped.empty()) {
       notes.push_back(fmt::format("{} instants were left out of the feasible set as outliers (at rows {})",
                                   bounded.result.dropped.size(), fmt::join(bounded.result.dropped, ", ")));
@@ -170,7 +97,7 @@ Bounded bounded_set(LogSource& log, const Setting& setting, Part part, const Fit
           "`noise:`, or narrow `prior:` in the robot file");
     }
   }
-  Bounded first = told(set_with(noise));
+  RefinedSet first = told(set_with(noise));
   if (first.result.set.status == FeasibleSet::Status::nonempty || s.noise_complete) {
     return first;
   }
@@ -184,7 +111,7 @@ Bounded bounded_set(LogSource& log, const Setting& setting, Part part, const Fit
       fmt::format("the estimated noise bound was raised by {:.3g}: within the prior box no parameters "
                   "explain the log with less",
                   factor));
-  Bounded raised = told(set_with(noise));
+  RefinedSet raised = told(set_with(noise));
   raised.raised = factor;
   return raised;
 }
@@ -313,7 +240,7 @@ HeldOut try_held_out(LogSource& log, const Setting& s, const CommissionOptions& 
   const Fit trained = fit_log(log, s, Part::training, options.extrapolation.risk);
   std::vector<std::string> unused;
   std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
-  const Bounded learnt =
+  const RefinedSet learnt =
       bounded_set(log, s, Part::training, trained, options.extrapolation.risk, noise, options.outliers, unused);
   const FeasibleSet& set = learnt.result.set;
   if (set.status != FeasibleSet::Status::nonempty) {
@@ -337,7 +264,7 @@ HeldOut try_held_out(LogSource& log, const Setting& s, const CommissionOptions& 
 struct Learnt {
   Fit fit;
   SignalFindings signals;
-  Bounded bounded;
+  RefinedSet bounded;
   std::optional<HeldOut> held_out;
   std::exception_ptr held_out_failed;
 };
@@ -460,11 +387,12 @@ std::string reservations(const Setting& s, const Commissioning& result) {
   return text;
 }
 
-// The contradictions that leave no model, each with what to do.
-std::string withdrawal(const Commissioning& result) {
+// The contradictions that `counts`, each with what to do.
+template <typename Counts>
+std::string withdrawal(const Commissioning& result, const Counts& counts) {
   std::string text;
   for (const LogContradiction& c : result.contradictions) {
-    if (c.withdraws) {
+    if (counts(c)) {
       text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", c.sentence, c.next);
     }
   }
@@ -485,6 +413,11 @@ std::string default_prior_in_the_way(const Setting& s, const Commissioning& resu
     }
   }
   return {};
+}
+
+bool holds_shift(const std::vector<LogContradiction>& contradictions) {
+  return std::ranges::find(contradictions, LogContradiction::Kind::effort_timing, &LogContradiction::kind) !=
+         contradictions.end();
 }
 
 // A model that the log contradicts is not published.
@@ -583,7 +516,9 @@ std::string status_message(const Setting& s, const Commissioning& result) {
              reservations(s, result);
     case Commissioning::Status::nothing: return "the log says nothing about any parameter: " + todo;
     case Commissioning::Status::empty: {
-      const std::string why = withdrawal(result);
+      const std::string why = withdrawal(result, [](const LogContradiction& c) {
+        return c.withdraws || c.kind == LogContradiction::Kind::effort_timing;
+      });
       if (std::string prior = default_prior_in_the_way(s, result); !prior.empty()) {
         return prior;
       }
@@ -595,7 +530,8 @@ std::string status_message(const Setting& s, const Commissioning& result) {
               ? "a fault, an effect that the model lacks (`gap` looks for it), or noise bounds that are too small"
               : why);
     }
-    case Commissioning::Status::contradicted: return "no model: " + withdrawal(result);
+    case Commissioning::Status::contradicted:
+      return "no model: " + withdrawal(result, std::mem_fn(&LogContradiction::withdraws));
   }
   return {};
 }
@@ -680,7 +616,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   Learnt learnt = learn_beside(log, s, options, result);
   result.model.kinematic = result.kinematic.model;
   const Fit& fit = learnt.fit;
-  Bounded& bounded = learnt.bounded;
+  RefinedSet& bounded = learnt.bounded;
   result.estimators = fit.choice;
   result.residuals = fit.residuals;
   result.rank = fit.squares.rank;
@@ -706,6 +642,10 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
 
   if (result.feasible.status == FeasibleSet::Status::empty) {
     tell(options, "measuring the contradiction", 0.7);
+    const auto& timing = learnt.signals.timing;
+    if (timing && looks_shifted(*timing, s.survey.median_step) && !holds_shift(result.contradictions)) {
+      result.contradictions.push_back(shift_finding(log, s, fit, *timing));
+    }
     result.minimax = needed_noise(log, s, result, options.outliers);
     result.status = Commissioning::Status::empty;
     result.message = status_message(s, result);

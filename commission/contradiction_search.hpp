@@ -21,11 +21,19 @@ inline constexpr double kLeastShift = 0.25;
 /// Instants from which on a fit of a half, a joint or a shift is looked at.
 inline constexpr std::size_t kFewestInstants = 200;
 
-/// Standard errors beyond which a difference is taken for real: two-sided, of Student's t with `freedom` degrees of
-/// freedom, at a risk of 1e-8 (a model is withdrawn in error once in 10⁸ looks).
+/// Standard errors beyond which a difference is taken for real at `risk`: two-sided, of Student's t with `freedom`
+/// degrees of freedom.
+[[nodiscard]] inline double errors_at(double risk, double freedom) {
+  return core::student_quantile(1.0 - risk, std::max(freedom, 1.0));
+}
+
+/// Risk at which a shift takes the word guaranteed away in error.
+inline constexpr double kRiskOfDoubt = 0.01;
+
+/// errors_at() a risk of 1e-8: a model is withdrawn in error once in 10⁸ looks.
 [[nodiscard]] inline double certain(double freedom) {
   constexpr double kRiskOfWithdrawal = 1e-8;
-  return core::student_quantile(1.0 - kRiskOfWithdrawal, std::max(freedom, 1.0));
+  return errors_at(kRiskOfWithdrawal, freedom);
 }
 
 /// A parameter as people know it.

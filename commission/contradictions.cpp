@@ -13,6 +13,7 @@
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
 #include "commission/premises.hpp"
+#include "commission/refined_set.hpp"
 #include "commission/setting.hpp"
 #include "commission/setting_rows.hpp"
 #include "commission/speed_smoothing.hpp"
@@ -261,31 +262,13 @@ void find_latency(LogSource& log, const Setting& s, const Fit& fit, const std::o
                              effort_declaration(s.robot),
                              late ? "stamp efforts and motion by one clock" : "log efforts that are not smoothed")});
   }
-  if (!timing || !is_latency(*timing, s.survey.median_step)) {
+  const double step = s.survey.median_step;
+  if (!timing || !(is_latency(*timing, step) || (s.noise_complete && may_be_latency(*timing, step)))) {
     return;
   }
-  if (const auto smoothing = may_be_smoothed(s, *timing) ? speed_smoothing(log, s, fit) : std::nullopt) {
-    out.push_back({.kind = Kind::effort_timing,
-                   .subject = s.measurement.motion_columns.front(),
-                   .value = timing->delay,
-                   .limit = kLeastShift * s.survey.median_step,
-                   .sentence = late_speeds(*smoothing),
-                   .next = way_out(*smoothing)});
-    return;
-  }
-  out.push_back(
-      {.kind = Kind::effort_timing,
-       .subject = s.measurement.effort_columns.front(),
-       .value = timing->delay,
-       .limit = kLeastShift * s.survey.median_step,
-       .sentence = fmt::format("the efforts come {:.3g} ± {:.1g} ms {} the motion, {:.2g} steps of the log{}",
-                               1e3 * std::abs(timing->delay), 2e3 * timing->standard_error,
-                               timing->delay > 0.0 ? "after" : "before", std::abs(timing->delay) / s.survey.median_step,
-                               timing->allowed.lower == 0.0 && timing->allowed.upper == 0.0
-                                   ? ""
-                                   : fmt::format(", where {:.3g} to {:.3g} ms are allowed", 1e3 * timing->allowed.lower,
-                                                 1e3 * timing->allowed.upper)),
-       .next = shift_words(s, *timing)});
+  out.push_back(shift_finding(log, s, fit, *timing));
+  out.back().withdraws = is_latency(*timing, step);
+  out.back().demotes = !out.back().withdraws;
 }
 
 void find_wrong_signs(const Setting& s, const Fit& fit, std::vector<LogContradiction>& out) {
@@ -363,6 +346,27 @@ void find_dry_friction(LogSource& log, const Setting& s, const Fit& fitted, std:
 }
 
 }  // namespace
+
+LogContradiction shift_finding(LogSource& log, const Setting& s, const Fit& fit, const EffortTiming& timing) {
+  LogContradiction found{
+      .kind = Kind::effort_timing, .value = timing.delay, .limit = kLeastShift * s.survey.median_step};
+  if (const auto smoothing = smoothing_behind(log, s, fit, timing)) {
+    found.subject = s.measurement.motion_columns.front();
+    found.sentence = late_speeds(*smoothing);
+    found.next = way_out(*smoothing);
+    return found;
+  }
+  found.subject = s.measurement.effort_columns.front();
+  found.sentence =
+      fmt::format("the efforts come {:.3g} ± {:.1g} ms {} the motion, {:.2g} steps of the log{}",
+                  1e3 * std::abs(timing.delay), 2e3 * timing.standard_error, timing.delay > 0.0 ? "after" : "before",
+                  std::abs(timing.delay) / s.survey.median_step,
+                  timing.allowed == Interval{} ? ""
+                                               : fmt::format(", where {:.3g} to {:.3g} ms are allowed",
+                                                             1e3 * timing.allowed.lower, 1e3 * timing.allowed.upper));
+  found.next = shift_words(s, timing);
+  return found;
+}
 
 std::vector<LogContradiction> contradictions_of_efforts(LogSource& log, const Setting& s) {
   std::vector<LogContradiction> found;
@@ -472,9 +476,11 @@ std::optional<Reach> reach_of(const LogContradiction& c, const Commissioning& re
   return std::nullopt;
 }
 
+// A shift that was found, and not one that was taken in, which has no limit.
+bool is_shift(const LogContradiction& c) { return c.kind == Kind::effort_timing && c.limit > 0.0; }
+
 bool is_weighed(const LogContradiction& c) {
-  return c.withdraws &&
-         (c.kind == Kind::effort_timing || c.kind == Kind::wrong_sign || c.kind == Kind::estimate_outside);
+  return is_shift(c) || (c.withdraws && (c.kind == Kind::wrong_sign || c.kind == Kind::estimate_outside));
 }
 
 }  // namespace
@@ -485,30 +491,53 @@ bool wants_weighing(const Commissioning& result, const Setting& s) {
 
 void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fit,
                           const std::optional<EffortTiming>& timing, const Explained& explained, bool errors_average) {
-  const auto weigh = [](LogContradiction& c, double size, double chance, double doubt, double noise) {
-    c.withdraws = size > chance + doubt + noise;
-    c.demotes = !c.withdraws && size > chance + doubt;
-  };
-  const auto p = static_cast<Eigen::Index>(s.model.p());
   for (LogContradiction& c : result.contradictions) {
     if (!is_weighed(c)) {
       continue;
     }
-    if (c.kind == Kind::effort_timing) {
-      if (timing) {
-        const double chance =
-            std::max(certain(timing->freedom) * timing->standard_error, kLeastShift * s.survey.median_step);
-        weigh(c, timing->beyond(), chance, explained.in_doubt[p], explained.noise[p]);
-      }
+    if (is_shift(c)) {
+      const ShiftWeight weight =
+          timing ? weigh_shift(*timing, explained, s.survey.median_step) : ShiftWeight::explained;
+      c.withdraws = weight == ShiftWeight::told;
+      c.demotes = weight == ShiftWeight::doubted;
     } else if (const auto reach = reach_of(c, result, fit)) {
       const auto at = static_cast<Eigen::Index>(reach->parameter);
-      weigh(c, reach->size, certain(result.residuals.freedom) * *result.parameters[reach->parameter].standard_error,
-            explained.in_doubt[at], explained.noise[at]);
-      c.demotes = c.demotes && errors_average;
+      const double chance = certain(result.residuals.freedom) * *result.parameters[reach->parameter].standard_error;
+      const double doubt = chance + explained.in_doubt[at];
+      c.withdraws = reach->size > doubt + explained.noise[at];
+      c.demotes = !c.withdraws && reach->size > doubt && errors_average;
     }
   }
   std::erase_if(result.contradictions,
-                [](const LogContradiction& c) { return c.kind == Kind::effort_timing && !c.withdraws && !c.demotes; });
+                [](const LogContradiction& c) { return is_shift(c) && !c.withdraws && !c.demotes; });
+}
+
+ShiftWeight weigh_shift(const EffortTiming& timing, const Explained& explained, double step) {
+  constexpr double kMuchExplained = 0.9;  // of the residual: more is left where errors merely look like a shift
+  const Eigen::Index last = explained.noise.size() - 1;
+  const auto beyond = [&](double errors) {
+    return timing.beyond() - std::max(errors * timing.standard_error, kLeastShift * step) - explained.in_doubt[last];
+  };
+  if (const double by = beyond(certain(timing.freedom)); is_latency(timing, step) && by > 0.0) {
+    return by > explained.noise[last] || timing.residual_ratio < kMuchExplained ? ShiftWeight::told
+                                                                                : ShiftWeight::doubted;
+  }
+  return may_be_latency(timing, step) && beyond(errors_at(kRiskOfDoubt, timing.freedom)) > 0.0 ? ShiftWeight::doubted
+                                                                                               : ShiftWeight::explained;
+}
+
+WithinDeclared within_declared(LogSource& log, const Setting& s, const Fit& fit,
+                               const std::optional<EffortTiming>& timing) {
+  const RefinedSet found = refined_set(log, s, Part::everything, s.declared, 0);
+  WithinDeclared verdict{.a_set = found.result.set.status == FeasibleSet::Status::nonempty};
+  if (verdict.a_set && timing && may_be_latency(*timing, s.survey.median_step)) {
+    filter::SignalErrors errors = s.declared;
+    errors.motion = found.learning;
+    const Explained explained = explained_by_errors(log, s, fit, errors, found.result.set.hull);
+    verdict.shift = weigh_shift(*timing, explained, s.survey.median_step);
+  }
+  log.rewind();
+  return verdict;
 }
 
 void weigh_efforts(LogSource& log, const Setting& s, const filter::SignalErrors& errors, const Box& box,

@@ -27,8 +27,7 @@ struct EffortTiming {
   double delay = 0.0;           ///< s; > 0: the logged effort comes late
   double standard_error = 0.0;  ///< s, valid under autocorrelated residuals
   double freedom = 1.0;         ///< degrees of freedom of its Student's t
-  Interval allowed{};  ///< s, what is taken as given: effort.delay; where bounds are declared and held efforts may
-                       ///< change between samples, up to a step more
+  Interval allowed{};           ///< s, what is taken as given: allowed_shift()
   double residual_ratio = 1.0;  ///< rms residual with the shift over that with the nearest one that is allowed
   double mirror_ratio = 1.0;    ///< the same as far on the other side of that: above 1 for a true shift
   double score = 0.0;  ///< of a shift at the nearest one that is allowed, as a multiple of what is told from none at a
@@ -38,6 +37,9 @@ struct EffortTiming {
   /// s, how far the shift lies outside of what is allowed; 0 inside.
   [[nodiscard]] double beyond() const { return std::max({0.0, allowed.lower - delay, delay - allowed.upper}); }
 };
+
+/// s, the shifts that the bounds of the rows of a set allow for, of a log with steps of `step` (s).
+[[nodiscard]] Interval allowed_shift(const filter::Measurement& measurement, double step);
 
 /// The shift that explains the first `most_rows` rows of `log` best, at most `longest` s beyond what is declared, or
 /// beyond that with its sign turned; nothing where none is told (flat, at the end of what is searched, segments too
@@ -52,6 +54,14 @@ struct EffortTiming {
 /// that either lowers the residual by 1 % or more or moves a parameter by two standard errors. Healthy logs with even
 /// steps showed 0.09 steps at most.
 [[nodiscard]] bool is_latency(const EffortTiming& timing, double step);
+
+/// True if `timing` is likely to be a latency: beyond what is allowed by more than a quarter of `step` (s), and told
+/// from that at a risk of 1 %. Bounds that take it for none are not called guaranteed.
+[[nodiscard]] bool may_be_latency(const EffortTiming& timing, double step);
+
+/// True if the best shift lies further beyond what is allowed than a quarter of `step` (s) and two standard errors: no
+/// evidence by itself, but a cause to look at where something else contradicts the log.
+[[nodiscard]] bool looks_shifted(const EffortTiming& timing, double step);
 
 /// s, a constant shift beyond what is declared that is_latency() would tell nearly always, of `step` (s) and the
 /// uncertainty of `timing`.
@@ -73,12 +83,38 @@ struct SignalFindings {
 [[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result,
                                                                      const Setting& setting, double raised);
 
-/// Weighs what statistics found in a log of declared noise against `explained`: Kind::effort_timing (`timing`),
-/// Kind::wrong_sign and Kind::estimate_outside keep LogContradiction::withdraws only beyond all of it, are
-/// LogContradiction::demotes beyond what is in doubt (signs and estimates only where `errors_average`, see
-/// premises.hpp: elsewhere noise explains them as well), and a shift below that is dropped.
+/// What a shift is beside declared errors.
+enum class ShiftWeight {
+  explained,  ///< none, by chance or by what is unknown between samples
+  doubted,    ///< chance does not explain it: nothing is called guaranteed
+  told,       ///< the worst noise does not either, or a tenth of the residual goes with it: no model
+};
+
+/// Weighs `timing` in a log of declared noise, of steps of `step` (s), against `explained`.
+[[nodiscard]] ShiftWeight weigh_shift(const EffortTiming& timing, const Explained& explained, double step);
+
+/// Weighs what statistics found in a log of declared noise against `explained`: Kind::effort_timing by weigh_shift()
+/// (one that is explained is dropped). Kind::wrong_sign and Kind::estimate_outside keep LogContradiction::withdraws
+/// beyond all of it alone; where `errors_average` (premises.hpp; elsewhere noise explains them as well) they are
+/// LogContradiction::demotes beyond what is in doubt.
 void weigh_contradictions(Commissioning& result, const Setting& setting, const Fit& fit,
                           const std::optional<EffortTiming>& timing, const Explained& explained, bool errors_average);
+
+/// What declared errors make of a log before it is commissioned: what commission_robot() will make of it.
+struct WithinDeclared {
+  bool a_set = true;  ///< some parameters in the prior explain every row
+  ShiftWeight shift = ShiftWeight::explained;
+};
+
+/// The verdict on `log` in a setting whose noise is declared, with the shift that was found in it. Walks the log a few
+/// times, as long as a feasible set takes.
+[[nodiscard]] WithinDeclared within_declared(LogSource& log, const Setting& setting, const Fit& fit,
+                                             const std::optional<EffortTiming>& timing);
+
+/// Kind::effort_timing of `timing` in words, whatever its size: efforts that are late or early, or speeds that are
+/// smoothed. Walks the log twice.
+[[nodiscard]] LogContradiction shift_finding(LogSource& log, const Setting& setting, const Fit& fit,
+                                             const EffortTiming& timing);
 
 /// True if weigh_contradictions() would change anything.
 [[nodiscard]] bool wants_weighing(const Commissioning& result, const Setting& setting);

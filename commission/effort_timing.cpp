@@ -94,6 +94,22 @@ std::optional<RegressionBlock> rows_as_logged(LogSource& log, const Setting& s, 
 
 }  // namespace
 
+Interval allowed_shift(const Measurement& m, double step) {
+  Interval allowed = m.delay;
+  const Interval sharpening = m.sharpening();  // its middle is taken
+  const double open = 0.5 * step * (sharpening.upper - sharpening.lower);
+  allowed.lower -= open;
+  allowed.upper += open;
+  const bool held = m.hold == Hold::zero_order;
+  // As the rows' own hull, which those of a set have whatever the noise is: a value may come into force up to a step
+  // before its stamp; a measured one lies between two.
+  if (allowed != Interval{} || (held && m.changes == model::EffortChanges::between)) {
+    allowed.upper += step;
+    allowed.lower -= held ? 0.0 : step;
+  }
+  return allowed;
+}
+
 std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, const Fit& fit, double longest,
                                           std::size_t most_rows) {
   const std::optional<RegressionBlock> rows = rows_as_logged(log, s, most_rows);
@@ -115,19 +131,7 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
       return std::nullopt;
     }
     EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
-    timing.allowed = declared;
-    const Interval sharpening = s.measurement.sharpening();  // its middle is taken
-    const double open = 0.5 * s.survey.median_step * (sharpening.upper - sharpening.lower);
-    timing.allowed.lower -= open;
-    timing.allowed.upper += open;
-    const bool held = s.measurement.hold == Hold::zero_order;
-    const bool ranged = timing.allowed.lower != 0.0 || timing.allowed.upper != 0.0;
-    // As the rows' own hull: a value may come into force up to a step before its stamp; a measured one lies between
-    // two.
-    if (s.declared.between_samples && (ranged || (held && s.measurement.changes == model::EffortChanges::between))) {
-      timing.allowed.upper += s.survey.median_step;
-      timing.allowed.lower -= held ? 0.0 : s.survey.median_step;
-    }
+    timing.allowed = allowed_shift(s.measurement, s.survey.median_step);
     if (timing.beyond() == 0.0) {
       return timing;
     }
@@ -166,6 +170,18 @@ bool is_latency(const EffortTiming& timing, double step) {
   const double shift = timing.beyond(), score = timing.delay < timing.allowed.lower ? -timing.score : timing.score;
   return shift > kLeastShift * step && shift > certain(timing.freedom) * timing.standard_error && score > 1.0 &&
          timing.mirror_ratio > kMirror && (timing.residual_ratio < kLowersResidual || timing.moved > kMovesParameter);
+}
+
+bool looks_shifted(const EffortTiming& timing, double step) {
+  constexpr double kLikely = 2.0;  // standard errors
+  return timing.beyond() > std::max(kLeastShift * step, kLikely * timing.standard_error);
+}
+
+bool may_be_latency(const EffortTiming& timing, double step) {
+  const double needed = errors_at(kRiskOfDoubt, timing.freedom);
+  const double score = timing.delay < timing.allowed.lower ? -timing.score : timing.score;
+  return timing.beyond() > kLeastShift * step && timing.beyond() > needed * timing.standard_error &&
+         score * certain(timing.freedom) > needed && timing.mirror_ratio > 1.0;
 }
 
 }  // namespace wheelwright::commission

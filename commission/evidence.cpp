@@ -113,9 +113,10 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   g.col(fitted) = square > 0.0 ? (left / square).eval() : Eigen::VectorXd::Zero(rows.rows()).eval();
   g.array().colwise() *= weight.array();
 
-  const Eigen::VectorXd doubt =
-      (bounded.dY + (bounded.Y - rows.Y).cwiseAbs()) * largest + bounded.dy + (bounded.y - rows.y).cwiseAbs();
-  const Eigen::VectorXd in_doubt = g.cwiseAbs().transpose() * doubt;
+  const Eigen::VectorXd of_motion = (bounded.dY + (bounded.Y - rows.Y).cwiseAbs()) * largest;
+  const Eigen::VectorXd doubt = of_motion + bounded.dy + (bounded.y - rows.y).cwiseAbs();
+  Eigen::VectorXd in_doubt = g.cwiseAbs().transpose() * doubt;
+  in_doubt[fitted] = g.col(fitted).cwiseAbs().dot(of_motion);  // EffortTiming::allowed has what efforts do
   filter::ErrorInfluence influence(s.model, s.filter, s.measurement, noise_budget(s.robot, s.measurement).sensors,
                                    theta, fitted + 1);
   influence.add(rows, g);

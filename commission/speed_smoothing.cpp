@@ -399,11 +399,18 @@ std::string declaration(const model::SpeedFilter& filter) {
                      filter.order == 2 ? ", order: 2" : "", filter.time.lower, filter.time.upper);
 }
 
-bool may_be_smoothed(const Setting& s, const EffortTiming& timing) {
-  constexpr double kAboutHalf = 0.2;  // of a step: measured efforts that are held commands are early by half of one
-  const bool half = std::abs(timing.delay / s.survey.median_step + 0.5) < kAboutHalf;
-  return timing.delay < 0.0 && is_latency(timing, s.survey.median_step) &&
-         !(half && s.measurement.hold == Hold::first_order);
+std::optional<SpeedSmoothing> smoothing_behind(LogSource& log, const Setting& s, const Fit& fit,
+                                               const EffortTiming& timing) {
+  constexpr double kAboutHalf = 0.1, kErrors = 2.0;  // of a step, interpolation's own; standard errors beside that
+  if (!(timing.delay < 0.0)) {
+    return std::nullopt;
+  }
+  auto smoothing = speed_smoothing(log, s, fit);
+  // Measured efforts that are held commands are early by half a step.
+  const double step = s.survey.median_step;
+  const bool held = s.measurement.hold == Hold::first_order &&
+                    std::abs(timing.delay + 0.5 * step) < kAboutHalf * step + kErrors * timing.standard_error;
+  return smoothing && held && !smoothing->told ? std::nullopt : smoothing;
 }
 
 std::string late_speeds(const SpeedSmoothing& smoothing) {

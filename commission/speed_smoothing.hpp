@@ -41,9 +41,10 @@ struct SpeedSmoothing {
 /// The line of a robot file that declares `filter`.
 [[nodiscard]] std::string declaration(const model::SpeedFilter& filter);
 
-/// Whether `timing` asks for speed_smoothing(): efforts that are early, and not by the half step by which held ones are
-/// early that are read as measured.
-[[nodiscard]] bool may_be_smoothed(const Setting& setting, const EffortTiming& timing);
+/// speed_smoothing() where `timing` says that efforts are early: by about half a step, by which held ones are that are
+/// read as measured, only where a filter is told from that.
+[[nodiscard]] std::optional<SpeedSmoothing> smoothing_behind(LogSource& log, const Setting& setting, const Fit& fit,
+                                                             const EffortTiming& timing);
 
 /// What was found, with its numbers, and what to do about it: sentences without a full stop.
 [[nodiscard]] std::string late_speeds(const SpeedSmoothing& smoothing);

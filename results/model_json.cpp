@@ -156,12 +156,16 @@ Json between_samples_json(const filter::SignalErrors& errors) {
 
 // What the motion in the rows can be wrong by; what the effort can is said elsewhere.
 Json motion_errors_json(const filter::SignalErrors& errors) {
-  return {{"acceleration", numbers(errors.acceleration)},
-          {"speed", numbers(errors.speed)},
-          {"speed_sample", numbers(errors.speed_sample)},
-          {"joint_sample", errors.joint_sample},
-          {"heading", errors.heading},
-          {"between_samples", between_samples_json(errors)}};
+  Json json = {{"acceleration", numbers(errors.acceleration)},
+               {"speed", numbers(errors.speed)},
+               {"speed_sample", numbers(errors.speed_sample)},
+               {"joint_sample", errors.joint_sample},
+               {"heading", errors.heading},
+               {"between_samples", between_samples_json(errors)}};
+  if (errors.held_between) {
+    json["held_between"] = true;
+  }
+  return json;
 }
 
 Json filter_json(const FilterDesign& filter, const commission::FilterChoice& choice) {

@@ -10,11 +10,9 @@
 #include "commission/contradictions.hpp"
 #include "commission/doctor/health_efforts.hpp"
 #include "commission/doctor/log_health.hpp"
-#include "commission/effort_smoothing.hpp"
 #include "commission/fit.hpp"
 #include "commission/physical.hpp"
 #include "commission/setting.hpp"
-#include "commission/speed_smoothing.hpp"
 #include "core/error.hpp"
 #include "core/statistics.hpp"
 #include "core/words.hpp"
@@ -32,17 +30,6 @@ constexpr double kMostTimesNominal = 8.0;   // robots that carry goods carry up 
 constexpr double kLeastTimesNominal = 0.2;  // and lose less
 constexpr double kOneFactor = 1.25;         // between ratios of mass, inertia and friction that are one factor
 constexpr double kUnusedRisk = 1e-3;        // for fit_log; not used further
-constexpr double kLongestTaken = 0.03;      // s: efforts later than this and than kMostStepsTaken are refused
-constexpr double kLongestSmoothing = 0.06;  // s, likewise
-constexpr double kMostStepsTaken = 2.5;     // two, and the half to which interpolated rows tell a shift
-constexpr double kTakenFrom = 0.5;          // of the least shift that is a latency
-constexpr double kLateFrom = 0.15;          // steps: healthy logs showed 0.09 at most
-constexpr double kSmallShift = 0.5;         // steps: beside declared errors no filter is looked for
-constexpr double kFilterRisk = 1e-4;        // of an interval of κ that misses
-constexpr double kNoisyEffort = 0.1;        // of κ: noise of the efforts makes it look smaller
-constexpr double kLeastSharpening = 0.03;   // κ, steps
-constexpr double kMostSharpening = 0.7;     // more may be a step of delay
-constexpr double kMovedBySmoothing = 2.0;   // standard errors of a parameter
 
 LogFinding about_motion(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
                         std::string unit) {
@@ -513,172 +500,6 @@ bool check_excitation(const HealthView& view, LogSource& log, const commission::
     out.push_back(f);
   }
   return true;
-}
-
-// κ of a filter of the efforts at a risk of kFilterRisk.
-Interval sharpening_range(const commission::EffortSmoothing& found) {
-  const double reach = core::student_quantile(1.0 - kFilterRisk, std::max(found.freedom, 1.0)) * found.standard_error +
-                       kNoisyEffort * std::abs(found.sharpening);
-  return {found.sharpening - reach, found.sharpening + reach};
-}
-
-// Outward to 10 µs.
-Interval rounded_time(double lower, double upper) {
-  return {std::floor(1e5 * lower) / 1e5, std::ceil(1e5 * upper) / 1e5};
-}
-
-// Efforts that are no commands as they acted, but those behind a low-pass filter. Held commands that act from their
-// stamps on are late by whole steps: what is late by less is smoothed.
-bool check_effort_filter(const HealthView& view, LogSource& log, const commission::Setting& s,
-                         const commission::Fit& fit, std::vector<LogFinding>& out) {
-  const bool at_stamps =
-      s.measurement.hold == Hold::zero_order && s.measurement.changes == model::EffortChanges::at_samples;
-  const bool declares = s.measurement.delay != Interval{} || s.measurement.smoothing != Interval{};
-  if (!view.robot_given || !at_stamps || declares || !view.robot.effects.empty()) {
-    return false;
-  }
-  const auto found = commission::effort_smoothing(log, s, fit);
-  if (!found) {
-    return false;
-  }
-  const Interval sharpening = sharpening_range(*found);
-  if (sharpening.lower < kLeastSharpening || sharpening.upper > kMostSharpening || found->moved < kMovedBySmoothing) {
-    return false;
-  }
-  const auto time = [&](double kappa) { return commission::EffortSmoothing::time_constant(kappa, view.step); };
-  const Interval range = rounded_time(time(sharpening.lower), time(sharpening.upper));
-  LogFinding f{.id = "signals.effort_filter",
-               .topic = FindingTopic::signals,
-               .severity = FindingSeverity::warning,
-               .columns = s.measurement.effort_columns,
-               .value = time(found->sharpening),
-               .unit = "s",
-               .effort_smoothing = range};
-  f.sentence = fmt::format(
-      "The efforts are smoothed: a low-pass filter with a time constant of {:.2g} to {:.2g} ms explains why they come "
-      "{:.2g} ± {:.1g} steps after the motion (95 %), which commands that are held from stamp to stamp do not. Every "
-      "command undoes it, and calls nothing guaranteed.",
-      1e3 * range.lower, 1e3 * range.upper, found->sharpening, 2.0 * found->standard_error);
-  f.next = fmt::format(
-      "`effort: {{smoothing: [{:g}, {:g}]}}` in the robot file declares it, with what is known of the filter; best, "
-      "log the efforts that are not smoothed.",
-      range.lower, range.upper);
-  out.push_back(std::move(f));
-  return true;
-}
-
-// What late efforts are taken for: a delay, a filter, or, where the log does not tell, anything from one to the other.
-struct TakenLag {
-  Interval delay;                     // s
-  std::optional<Interval> smoothing;  // s, time constant
-
-  [[nodiscard]] std::string words() const {
-    return fmt::format(
-        "a delay of {:g} to {:g} s{}", delay.lower, delay.upper,
-        smoothing ? fmt::format(" behind a low-pass filter of {:g} to {:g} s", smoothing->lower, smoothing->upper)
-                  : "");
-  }
-  [[nodiscard]] std::string keys() const {
-    return fmt::format("delay: [{:g}, {:g}]{}", delay.lower, delay.upper,
-                       smoothing ? fmt::format(", smoothing: [{:g}, {:g}]", smoothing->lower, smoothing->upper) : "");
-  }
-};
-
-// `range`: of the delay, if it is one. A filter that runs faster than the log is later by up to a step than one that
-// runs with it.
-TakenLag lag_of_efforts(const HealthView& view, LogSource& log, const commission::Setting& s,
-                        const commission::Fit& fit, double delay, const Interval& range) {
-  const commission::EffortLag told = commission::effort_lag(log, s, fit, delay);
-  TakenLag lag{range, std::nullopt};
-  const auto found = told == commission::EffortLag::delay ? std::nullopt : commission::effort_smoothing(log, s, fit);
-  if (found && found->sharpening > 0.0) {
-    const Interval sharpening = sharpening_range(*found);
-    const bool filter = told == commission::EffortLag::filter;
-    lag.smoothing = rounded_time(filter ? std::max(0.0, sharpening.lower * view.step) : 0.0,
-                                 commission::EffortSmoothing::time_constant(sharpening.upper, view.step));
-    lag.delay = {0.0, filter ? view.step : range.upper};
-  }
-  return lag;
-}
-
-// Effort against motion in time, where a shift explains the log better than none.
-void check_delay(const HealthView& view, LogSource& log, const commission::Setting& s, const commission::Fit& fit,
-                 std::vector<LogFinding>& out) {
-  const std::optional<commission::EffortTiming> timing = commission::effort_timing(log, s, fit);
-  if (!timing || (timing->delay > -kLateFrom * view.step && check_effort_filter(view, log, s, fit, out))) {
-    return;
-  }
-  // Declared errors may allow for a step of it: commissioning weighs that.
-  const model::SensorNoise& declared = view.robot.noise;
-  const bool weighed = declared.effort.value && (declared.wheel_speed.value || declared.wheel_angle.value) &&
-                       timing->beyond() <= view.step;
-  const bool small = weighed && timing->beyond() < kSmallShift * view.step;
-  if (!small && commission::may_be_smoothed(s, *timing) && check_smoothing(view, s, fit, out)) {
-    return;
-  }
-  const double delay = timing->delay, error = timing->standard_error, left = timing->residual_ratio;
-  const bool matters = commission::is_latency(*timing, view.step) ||
-                       (std::abs(delay) > 3.0 * error && left < 0.95 && std::abs(delay) > 0.25 * view.step);
-  const bool large = matters && std::abs(delay) > 0.75 * view.step;
-  const bool latency = view.robot_given && commission::is_latency(*timing, view.step);
-  const double about = 5.0 * error + 0.5 * view.step;  // interpolated rows tell a shift to half a step
-  const Interval range{std::floor(1e4 * (delay - about)) / 1e4, std::ceil(1e4 * (delay + about)) / 1e4};
-  const bool late = s.noise_complete
-                        ? commission::is_latency(*timing, kTakenFrom * view.step)
-                        : delay > 4.0 * error && delay > kLateFrom * view.step && timing->mirror_ratio > 1.001 &&
-                              (timing->residual_ratio < 0.99 || timing->moved > 2.0);
-  const bool may_take = view.robot_given && delay > 0.0 && s.measurement.delay == Interval{} &&
-                        s.measurement.smoothing == Interval{} && view.robot.effects.empty() && late;
-  const std::optional<TakenLag> lag =
-      may_take ? std::optional(lag_of_efforts(view, log, s, fit, delay, range)) : std::nullopt;
-  const double most = kMostStepsTaken * view.step;
-  const bool taken = lag && lag->delay.upper <= std::max(kLongestTaken, most) &&
-                     lag->smoothing.value_or(Interval{}).upper <= std::max(kLongestSmoothing, most);
-  LogFinding f{.id = "time.effort_delay",
-               .topic = FindingTopic::time,
-               .severity = latency && !weighed && !taken ? FindingSeverity::fatal
-                           : large || latency || taken   ? FindingSeverity::warning
-                           : matters                     ? FindingSeverity::notice
-                                                         : FindingSeverity::fine};
-  f.columns = s.measurement.effort_columns;
-  f.value = delay;
-  f.unit = std::string("s");
-  const Interval declared_delay = s.measurement.delay;
-  f.sentence = declared_delay != Interval{} && timing->beyond() == 0.0
-                   ? fmt::format("The effort comes {:.2g} ± {:.1g} s {} the motion (95 %), as the robot file allows.",
-                                 std::abs(delay), 2.0 * error, delay > 0.0 ? "after" : "before")
-               : matters || taken
-                   ? fmt::format(
-                         "The effort comes {:.2g} ± {:.1g} s {} the motion (95 %); shifted by that, {:.0f} % of the "
-                         "residual are left.",
-                         std::abs(delay), 2.0 * error, delay > 0.0 ? "after" : "before", 100.0 * left)
-                   : fmt::format(
-                         "No shift in time between effort and motion explains the log better: the best, {:.2g} s, "
-                         "leaves {:.0f} % of the residual.",
-                         delay, 100.0 * left);
-  const double half = delay / view.step;
-  const bool held = matters && s.measurement.hold == Hold::first_order && std::abs(half + 0.5) < 0.2;
-  const bool measured = matters && s.measurement.hold == Hold::zero_order && std::abs(half - 0.5) < 0.2;
-  f.next = held       ? "That is half a step: the efforts look like commands that are held. Set effort.hold to "
-                        "zero_order in the robot file."
-           : measured ? "That is half a step: the efforts look measured. Set effort.hold to first_order in the "
-                        "robot file."
-           : large    ? "Stamp both with one clock where they are measured; where they are, the actuator or a "
-                        "sensor is slow: `wheelwright gap` tells them apart."
-           : matters  ? "It is less than a step: `effort.hold` in the robot file counts for half of one."
-                      : "";
-  if (taken) {
-    f.taken = lag->delay;
-    f.effort_smoothing = lag->smoothing;
-    f.sentence += fmt::format(
-        " Commands take it for {}: bounds widen by what the efforts change in that time and a step, and none is called "
-        "guaranteed.",
-        lag->words());
-    f.next = fmt::format("`effort: {{{}}}` in the robot file declares it. {}", lag->keys(), f.next);
-  } else if (lag && lag->smoothing) {
-    f.sentence += fmt::format(" Efforts with {} look like that.", lag->words());
-  }
-  out.push_back(f);
 }
 
 // What commissioning holds against the effort of one joint; with declared noise it weighs that, and may drop it.

@@ -22,7 +22,7 @@ std::string as_sentence(std::string text) {
   return text + ".";
 }
 
-// Whether the efforts are in time once they have passed through `filter`.
+// Whether the efforts are in time once they have passed through `filter`, and declared errors explain the log.
 bool comes_in_time(const HealthView& view, const model::SpeedFilter& filter) {
   TableSource log(*view.log);
   Robot robot = view.robot;
@@ -30,21 +30,22 @@ bool comes_in_time(const HealthView& view, const model::SpeedFilter& filter) {
   const commission::Setting s = commission::settle(log, robot);
   const commission::Fit fit = commission::fit_log(log, s, commission::Part::everything, kNoRisk);
   const auto timing = commission::effort_timing(log, s, fit);
-  return !timing || !commission::is_latency(*timing, view.step);
+  return (!timing || !commission::is_latency(*timing, view.step)) &&
+         (!s.noise_complete || commission::within_declared(log, s, fit, std::nullopt).a_set);
 }
 
 }  // namespace
 
 bool check_smoothing(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
-                     std::vector<LogFinding>& findings) {
+                     const commission::EffortTiming& timing, bool refused, std::vector<LogFinding>& findings) {
   TableSource log(*view.log);
-  const auto smoothing = commission::speed_smoothing(log, s, fit);
+  const auto smoothing = commission::smoothing_behind(log, s, fit, timing);
   if (!smoothing) {
     return false;
   }
   LogFinding f{.id = "signals.speed_filter",
                .topic = FindingTopic::signals,
-               .severity = FindingSeverity::fatal,
+               .severity = refused ? FindingSeverity::fatal : FindingSeverity::warning,
                .columns = s.measurement.motion_columns,
                .value = smoothing->time,
                .unit = "s"};

@@ -16,6 +16,7 @@
 #include "model/robot.hpp"
 
 namespace wheelwright::commission {
+struct EffortTiming;
 struct Fit;
 struct Setting;
 }  // namespace wheelwright::commission
@@ -185,10 +186,15 @@ bool check_direction(const HealthView& view, std::vector<LogFinding>& findings);
 void check_rounding(const HealthView& view, std::vector<LogFinding>& findings);
 /// Up to three rows in which a column leaps away and back: those that the reader left out, and those that are there.
 void check_spikes(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& findings);
-/// Efforts that are early because speeds passed through a low-pass filter, in this setting with its fit. Returns
-/// whether that, or that it cannot be told from a delay, was said.
+/// Effort against motion in time, where a shift explains the log better than none, or declared errors explain nothing
+/// without one: what commands take late or smoothed efforts for, and what commissioning refuses.
+void check_delay(const HealthView& view, LogSource& log, const commission::Setting& setting, const commission::Fit& fit,
+                 std::vector<LogFinding>& findings);
+/// Efforts that are early by `timing` because speeds passed through a low-pass filter, in this setting with its fit.
+/// `refused`: commissioning makes no model of them as they are. Returns whether that, or that it cannot be told from a
+/// delay, was said.
 bool check_smoothing(const HealthView& view, const commission::Setting& setting, const commission::Fit& fit,
-                     std::vector<LogFinding>& findings);
+                     const commission::EffortTiming& timing, bool refused, std::vector<LogFinding>& findings);
 /// Rows of a second source among those of a first.
 void check_sources(const HealthView& view, std::vector<LogFinding>& findings);
 /// Whether the log is that of a differential drive: joints as the reader met them, turning by gyro or pose against the

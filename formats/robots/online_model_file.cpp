@@ -254,6 +254,7 @@ filter::SignalErrors motion_errors_at(const JsonPlace& place, const Model& model
   errors.speed_sample = optional_vector("speed_sample");
   errors.joint_sample = bound_at(place.at("joint_sample"));
   errors.heading = bound_at(place.at("heading"));
+  errors.held_between = place.has("held_between") && place.at("held_between").boolean();
   read_between_samples(place, model, errors);
   return errors;
 }

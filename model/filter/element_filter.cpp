@@ -258,7 +258,7 @@ bool ElementFilter::measure_effort(std::size_t age) {
   const bool mean = measurement_.motion == MotionKind::mean_speed;
   const bool between = measurement_.changes == model::EffortChanges::between;
   // Without bounds the nominal hold is taken: the middle of what is possible would be half a step late.
-  const bool hull = ranged_ || (held && between && errors_.between_samples);
+  const bool hull = ranged_ || (held && between && (errors_.between_samples || errors_.held_between));
   const Eigen::Index joints = low_.size();
   bool alike = true;  // what falls is the same as what rises
   if (hull) {

@@ -49,6 +49,7 @@ struct SignalErrors {
   double joint_sample = 0.0;     ///< of each joint's unfiltered speed, mean of a nominal step or sample
   double heading = 0.0;          ///< rad
   bool between_samples = false;  ///< dY and dy hold what motion and efforts may do between two samples as well
+  bool held_between = false;     ///< dy holds what held efforts that change between samples may do there, in any case
   MotionBound motion{};          ///< how fast the motion can change between two samples
   bool bridges = false;  ///< where rows are lost a segment goes on (ElementFilter::bridges). Not for a fit, which takes
                          ///< the noise of all rows for alike

@@ -243,7 +243,7 @@ void RegressorFilter::write_row() {
     }
   }
   // Doubt of a correction, a filter or a delay is no matter of what happens between samples.
-  const bool doubted = !elements_.corrector().empty() || measurement().smoothing.upper > 0.0 ||
+  const bool doubted = errors.held_between || !elements_.corrector().empty() || measurement().smoothing.upper > 0.0 ||
                        measurement().delay.lower < measurement().delay.upper;
   // Where the motion's errors are not known the output's bound stands for them.
   const double rougher = errors.joint_sample > 0.0 ? 1.0 : 1.0 + rough();

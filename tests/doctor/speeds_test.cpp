@@ -171,6 +171,62 @@ INSTANTIATE_TEST_SUITE_P(Filters, SmoothedSpeeds,
                                          Smoothed{{.kind = kExponential, .time = {0.05, 0.05}}, 200.0},
                                          Smoothed{{.kind = model::SpeedFilterKind::mean, .time = {0.1, 0.1}}, 100.0}));
 
+// The log as every command reads it (results/sound_log.hpp), commissioned.
+commission::Commissioning commissioned(const LogTable& log, Robot read, const LogHealth& health) {
+  for (const LogFinding& found : health.findings) {
+    read.speed_filter = found.speed_filter ? found.speed_filter : read.speed_filter;
+    if (found.id == "time.effort_delay" && found.taken) {
+      read.effort_delay = *found.taken;
+      read.effort_delay_found = true;
+    }
+    if (found.effort_smoothing) {
+      read.effort_smoothing = *found.effort_smoothing;
+      read.effort_delay_found = true;
+    }
+  }
+  TableSource source(log);
+  commission::CommissionOptions options;
+  options.at_risk = commission::CommissionOptions::AtRisk::nothing;
+  return commission::commission_robot(source, read, options);
+}
+
+// With and without a model, and never guaranteed without the truth: bounds that hold, or are too small for the filter.
+TEST(Speeds, ThatAreSmoothedBesideDeclaredNoiseAreTheSameToDoctorAndCommission) {
+  const double truth[] = {kMass, kInertia, kDrag, kYawDrag};
+  std::size_t models = 0, refusals = 0;
+  for (const double rate : {50.0, 100.0}) {
+    for (const double time : {0.0, 0.005, 0.01, 0.03}) {
+      for (const double declared : {0.011, 0.05, 0.2}) {
+        for (const Interval& delay : {Interval{}, Interval{0.0, 1e-4}}) {
+          LogTable log = without_angles(drive({.rate = rate, .seconds = 40.0, .seed = 9}));
+          if (time > 0.0) {
+            change_speeds(log, [&](auto& values) {
+              smooth(values, {.kind = model::SpeedFilterKind::exponential, .time = {time, time}}, rate);
+            });
+          }
+          Robot read = robot();
+          read.noise.wheel_speed.value = declared;
+          read.noise.effort.value = 0.051;
+          read.effort_delay = delay;
+          const LogHealth health = examine(log, read);
+          const commission::Commissioning result = commissioned(log, read, health);
+          const std::string what = std::to_string(rate) + " Hz, " + std::to_string(time) + " s, ± " +
+                                   std::to_string(declared) + '\n' + told(health) + result.message;
+          EXPECT_EQ(health.verdict == LogVerdict::commission, result.has_model()) << what;
+          (result.has_model() ? models : refusals) += 1;
+          for (std::size_t j = 0; j < 4 && result.has_model(); ++j) {
+            const Interval found{result.parameters[j].lower, result.parameters[j].upper};
+            EXPECT_TRUE(found.contains(kRadius * truth[j])) << j << ' ' << what;
+          }
+          EXPECT_TRUE(time > 0.0 || result.model.warrant == core::Warrant::guaranteed) << what;
+        }
+      }
+    }
+  }
+  EXPECT_GT(models, 0U);
+  EXPECT_GT(refusals, 0U);
+}
+
 TEST(Speeds, OfAnOrdinaryLogHaveNoneOfThis) {
   for (const double rate : {20.0, 100.0, 250.0}) {
     for (const unsigned seed : {1U, 2U}) {
