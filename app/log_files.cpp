@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/log_files.hpp"
 
+#include <algorithm>
+
+#include <fmt/format.h>
+
 #include "app/common.hpp"
 #include "core/error.hpp"
 #include "core/words.hpp"
@@ -29,7 +33,14 @@ logs::LogOptions reader_options(const CommonOptions& options) {
       throw InputError("--map '" + entry + "': " + files::shown(name) + " is no column of a log: expected one of " +
                        core::listed(names) + files::did_you_mean(name, names));
     }
-    reader.map[name] = entry.substr(at + 1);
+    std::string column = entry.substr(at + 1);
+    if (const auto declared = reader.map.find(name); declared != reader.map.end()) {
+      if (const auto factor = logs::factor_alone(column)) {  // of what the robot file names
+        const auto [field, own] = logs::split_factor(declared->second);
+        column = fmt::format("{}*{:.17g}", field, own * *factor);
+      }
+    }
+    reader.map[name] = column;
     std::erase(reader.or_by_name, name);
   }
   return reader;

@@ -58,8 +58,7 @@ void add_map(CLI::App& command, CommonOptions& options) {
                "--map", options.map,
                "Read the log column NAME from the file's column COLUMN, or from a bag's TOPIC.FIELD (repeatable), e.g. "
                "--map omega_r=wheel_2 or --map omega_r=/joint_states.velocity[right_wheel]; COLUMN*FACTOR multiplies, "
-               "for other "
-               "units (rpm: *0.10472)")
+               "for other units (rpm: *0.10472), and *FACTOR alone what is read without --map")
            ->type_name("NAME=COLUMN"));
   repeatable(*command
                   .add_option("--msg-path", options.msg_path,

@@ -130,7 +130,9 @@ class Chooser {
       list_fields(k);
     }
     for (const auto& [name, field] : options_.map) {
-      take_mapped(name, field);
+      if (!factor_alone(field)) {
+        take_mapped(name, field);
+      }
     }
     for (std::size_t k = 0; k < topics_.size(); ++k) {
       offer_from(k);
@@ -142,11 +144,36 @@ class Chooser {
       joints_of_topic(source.topic).settle(source);
     }
     std::erase_if(choice_.sources, [](const BagSource& source) { return source.columns.empty(); });
+    scale_taken();
     order_sources();
     return std::move(choice_);
   }
 
  private:
+  /// Multiplies the columns of which the map gives no more than a factor.
+  void scale_taken() {
+    for (const auto& [name, mapped] : options_.map) {
+      const std::optional<double> factor = factor_alone(mapped);
+      if (!factor || (options_.only && std::ranges::count(*options_.only, name) == 0)) {
+        continue;
+      }
+      bool found = false;
+      for (BagSource& source : choice_.sources) {
+        for (BagColumn& column : source.columns) {
+          if (column.name == name) {
+            column.factor *= *factor;
+            found = true;
+            choice_.notes.push_back(fmt::format("{} is {} times {:g}", name, column.fields.front(), column.factor));
+          }
+        }
+      }
+      if (!found && std::ranges::count(taken_, name) == 0) {
+        throw InputError(
+            fmt::format("{}: nothing was found for {}, which --map {}={} multiplies", path_, name, name, mapped));
+      }
+    }
+  }
+
   [[nodiscard]] const BagTopic& topic(std::size_t k) const { return *topics_[k].topic; }
 
   [[nodiscard]] JointChoice joints_of_topic(std::size_t k) { return {topics_[k], options_, path_, choice_}; }
@@ -454,7 +481,7 @@ class Chooser {
     std::vector<std::string> wheels;
     std::ranges::copy_if(view.names, std::back_inserter(wheels), [](const std::string& name) {
       const std::string plain = plain_name(name);
-      return contains(plain, "wheel") && !is_caster(plain) && !is_steering(plain);
+      return names_wheel(plain) && !is_caster(plain) && !is_steering(plain);
     });
     const std::vector<std::string>& joints = wheels.empty() ? view.names : wheels;
     std::vector<std::string> right = joints_of("r", joints), left = joints_of("l", joints);
@@ -468,6 +495,7 @@ class Chooser {
     if (!is_named("r") || !is_named("l")) {
       judged.sort_out(!wheels.empty(), right, left);
     }
+    judged.tell_no_side(joints, right, left);
     const std::size_t before = offers_.size();
     for (const auto& [side, of_side] :
          {std::pair<std::string, const std::vector<std::string>&>("r", right), {"l", left}}) {
@@ -491,7 +519,7 @@ class Chooser {
   [[nodiscard]] bool is_named(const std::string& side) const {
     return std::ranges::all_of(std::array{"omega_" + side, "tau_" + side}, [&](const std::string& name) {
       const auto mapped = options_.map.find(name);
-      return mapped != options_.map.end() &&
+      return mapped != options_.map.end() && !factor_alone(mapped->second) &&
              (!joint_place(split_factor(mapped->second).first) || std::ranges::find(named_, name) != named_.end());
     });
   }

@@ -26,6 +26,23 @@ namespace {
 
 constexpr std::size_t rows_looked_at = 5000;  ///< rows at the beginning of a file, for columns with rates of their own
 
+/// `line` with a comma in place of every run of blanks between its words.
+std::string with_commas(std::string_view line) {
+  std::string out;
+  for (const char c : line) {
+    const bool blank = c == ' ' || c == '\t' || c == '\r';
+    if (!blank) {
+      out += c;
+    } else if (!out.empty() && out.back() != ',') {
+      out += ',';
+    }
+  }
+  if (!out.empty() && out.back() == ',') {
+    out.pop_back();
+  }
+  return out;
+}
+
 /// Content lines of one file behind its header.
 struct FileWalk {
   FileWalk(const std::filesystem::path& path, bool hashed, bool trust)
@@ -38,8 +55,13 @@ struct FileWalk {
     }
     while (lines.next(line)) {
       if (is_csv_content(line)) {
+        if (blanks) {
+          squeezed = with_commas(line);
+          line = squeezed;
+        }
         return true;
       }
+      comment = line.empty() ? comment : std::string(line);
     }
     return false;
   }
@@ -52,15 +74,80 @@ struct FileWalk {
 
   files::LineReader lines;
   std::string back;
+  std::string comment;  ///< the last line that is none of content
+  std::string squeezed;
   bool is_back = false;
+  bool blanks = false;  ///< blanks separate: lines come with commas in their places
 };
+
+/// Whether a header of these fields has a column of times.
+bool has_time(const std::vector<std::string>& fields, const CsvOptions& options) {
+  const auto mapped = options.map.find("t");
+  return std::ranges::any_of(fields, [&](const std::string& field) {
+    return names_time(field) || (mapped != options.map.end() && split_factor(mapped->second).first == field);
+  });
+}
+
+std::vector<std::string> fields_of(std::string_view line) { return split_fields(line, separator_of(line)); }
+
+constexpr std::size_t fewest_columns = 3;
+
+/// Whether a line is rather a title above the header: of few fields, and none of them times.
+bool is_title(std::string_view line, const CsvOptions& options) {
+  return fields_of(line).size() < fewest_columns && !has_time(fields_of(line), options);
+}
+
+bool all_numbers(const std::vector<std::string>& fields) {
+  return fields.size() > 1 &&
+         std::ranges::all_of(fields, [](const std::string& f) { return files::to_number(f).has_value(); });
+}
+
+/// The header where it does not stand in the first line of content, which is `first`: in the comment above numbers, or
+/// below titles. Nothing where it does. Settles whether blanks separate.
+std::optional<std::string> header_elsewhere(FileWalk& walk, const CsvOptions& options, const std::string& first) {
+  constexpr std::size_t most_titles = 20;
+  const auto bare = [](std::string_view comment) {
+    const std::size_t begin = comment.find_first_not_of("# \t");
+    return begin == std::string_view::npos ? std::string() : std::string(comment.substr(begin));
+  };
+  const std::string comma = with_commas(first), names = bare(walk.comment), comma_names = with_commas(names);
+  if (fields_of(first).size() < 2) {  // perhaps blanks separate
+    if (all_numbers(fields_of(comma)) && fields_of(comma_names).size() == fields_of(comma).size()) {
+      walk.blanks = true;
+      walk.put_back(comma);
+      return comma_names;
+    }
+    if (fields_of(comma).size() >= fewest_columns && has_time(fields_of(comma), options)) {
+      walk.blanks = true;
+      return comma;
+    }
+  }
+  if (all_numbers(fields_of(first)) && split_fields(names, separator_of(first)).size() == fields_of(first).size() &&
+      has_time(split_fields(names, separator_of(first)), options)) {
+    walk.put_back(first);
+    return names;
+  }
+  std::string_view line = first;
+  for (std::size_t k = 0; k < most_titles && is_title(line, options); ++k) {
+    if (!walk.next(line)) {
+      return std::nullopt;
+    }
+  }
+  return line != first && has_time(fields_of(line), options) ? std::optional(std::string(line)) : std::nullopt;
+}
 
 CsvHeader header_of(FileWalk& walk, const CsvOptions& options, const std::string& path) {
   std::string_view line;
   if (!walk.next(line) || (names_separator(line) && !walk.next(line))) {
     throw InputError(path + ": no header line: expected the names of the columns, then rows");
   }
-  const std::string header(line), place = fmt::format("{}:{}", path, walk.lines.number());
+  const std::string first(line), first_place = fmt::format("{}:{}", path, walk.lines.number());
+  const std::optional<std::string> elsewhere = header_elsewhere(walk, options, first);
+  const std::string header = elsewhere.value_or(first),
+                    place = elsewhere ? fmt::format("{}:{}", path, walk.lines.number()) : first_place;
+  if (!elsewhere && is_title(first, options)) {
+    return read_csv_header(first, options, first_place);  // which says what it lacks
+  }
   std::optional<std::vector<std::string>> units;
   if (walk.next(line)) {
     units = units_in_line(header, line);

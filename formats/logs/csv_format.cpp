@@ -41,10 +41,10 @@ std::string_view trimmed_field(std::string_view text) {
                                          : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
 }
 
-/// The one of , ; and tab that occurs most often outside quotes; the comma where none does.
+/// The one of , ; tab and | that occurs most often outside quotes; the comma where none does.
 char find_separator(std::string_view line) {
-  constexpr std::string_view candidates = ",;\t";
-  std::size_t counts[3] = {0, 0, 0};
+  constexpr std::string_view candidates = ",;\t|";
+  std::size_t counts[4] = {0, 0, 0, 0};
   bool in_quotes = false;
   for (const char c : line) {
     in_quotes ^= c == '"';
@@ -53,14 +53,26 @@ char find_separator(std::string_view line) {
       ++counts[k];
     }
   }
-  return candidates[static_cast<std::size_t>(std::max_element(counts, counts + 3) - counts)];
+  return candidates[static_cast<std::size_t>(std::max_element(counts, counts + 4) - counts)];
+}
+
+/// What makes a table of binary data that begins so; empty where that is not known.
+std::string maker_of(std::string_view line) {
+  return line.starts_with("PAR1") ? "; this is Parquet: python3 -c \"import pandas; "
+                                    "pandas.read_parquet('LOG').to_csv('log.csv', index=False)\" makes a table of it"
+         : line.starts_with("MATLAB")
+             ? "; this is a MATLAB file: writetable(TABLE, 'log.csv') in MATLAB makes a table, and "
+               "save -v7.3 a file that is read as HDF5"
+         : line.starts_with("ULog")    ? "; this is a ULog of PX4: ulog2csv (pip install pyulog) makes tables of it"
+         : line.starts_with("#ROSBAG") ? "; this is a packed ROS 1 bag: unpack it first"
+                                       : "";
 }
 
 void check_is_text(std::string_view line, const std::string& place) {
   const bool binary = std::any_of(
       line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\r'; });
   if (binary) {
-    throw InputError(place + ": binary data: expected a header line with the names of the columns");
+    throw InputError(place + ": binary data: expected a header line with the names of the columns" + maker_of(line));
   }
 }
 
@@ -339,8 +351,14 @@ void recognise(CsvHeader& header, const CsvOptions& options, const std::string& 
     }
     if (fields.size() > 1) {
       const std::string first = header.fields[fields[0]], second = header.fields[fields[1]];
-      throw InputError(fmt::format("{}: columns {} and {} both mean {}: expected one, or a choice by --map {}=COLUMN",
-                                   place, shown(first), shown(second), name, name));
+      throw InputError(
+          first == second
+              ? fmt::format(
+                    "{}: two columns are called {}: expected names that differ; give one of them another in the "
+                    "header",
+                    place, shown(first))
+              : fmt::format("{}: columns {} and {} both mean {}: expected one, or a choice by --map {}=COLUMN", place,
+                            shown(first), shown(second), name, name));
     }
     header.found[name] = fields.front();
     if (const double factor = column_of(fields.front()).second; factor != 1.0) {
@@ -360,6 +378,14 @@ std::string without_brackets(std::string_view unit) {
 }
 
 }  // namespace
+
+bool names_time(const std::string& field) {
+  const LogColumn* column = column_of_field(field);
+  column = column != nullptr ? column : foreign_column_of(field).first;
+  return column != nullptr && column->name == "t";
+}
+
+char separator_of(std::string_view line) { return find_separator(line); }
 
 bool names_separator(std::string_view line) {
   line = trimmed_field(line);
@@ -427,6 +453,69 @@ std::pair<std::string, double> split_factor(const std::string& text) {
              : std::pair{text, 1.0};
 }
 
+std::optional<double> factor_alone(const std::string& text) {
+  const auto [field, factor] = split_factor(text);
+  return field.empty() && !text.empty() ? std::optional(factor) : std::nullopt;
+}
+
+namespace {
+
+/// Where the times of a table may be that has no column for them, and what makes one of it; empty where nothing tells.
+std::string times_in_other_columns(const CsvHeader& header) {
+  const auto ending = [&](std::initializer_list<std::string_view> names) {
+    return static_cast<std::size_t>(
+        std::ranges::find_if(header.fields,
+                             [&](const std::string& field) {
+                               const std::string plain = plain_name(field);
+                               return std::ranges::any_of(names, [&](std::string_view name) {
+                                 return plain == name || plain.ends_with(fmt::format("_{}", name));
+                               });
+                             }) -
+        header.fields.begin());
+  };
+  const std::string_view separator = header.separator == '\t' ? "'\\t'" : header.separator == ';' ? "';'" : ",";
+  const std::size_t seconds = ending({"sec", "secs", "seconds"}),
+                    rest = ending({"nanosec", "nsec", "nsecs", "nanoseconds"});
+  if (seconds < header.fields.size() && rest < header.fields.size()) {
+    return fmt::format(
+        "; its times are in two columns, s and ns: awk -F{0} -v OFS={0} 'NR==1{{print \"t\",$0;next}} {{print "
+        "sprintf(\"%d.%09d\",${1},${2}),$0}}' LOG > with_t.csv makes one of them",
+        separator, seconds + 1, rest + 1);
+  }
+  if (!header.fields.empty() && header.fields.front().empty()) {
+    return "; its first column has no name, as pandas writes an index: if it is the time, sed '1s/^/t/' LOG > "
+           "named.csv "
+           "names it";
+  }
+  if (const std::size_t index = ending({"index", "row", "sample", "frame", "seq", "no", "nr", "i", "n", "k"});
+      index < header.fields.size()) {
+    return fmt::format("; where {0} counts rows that are 0.01 s apart, --map t=\"{0}*0.01\" makes times of it",
+                       header.fields[index]);
+  }
+  return fmt::format(
+      "; rows that are 0.01 s apart get times by awk -F{0} -v OFS={0} 'NR==1{{print \"t\",$0;next}} "
+      "{{print (NR-2)*0.01,$0}}' LOG > with_t.csv",
+      separator);
+}
+
+/// Multiplies the columns of which the map gives no more than a factor.
+void scale_found(CsvHeader& header, const CsvOptions& options, const std::string& place) {
+  for (const auto& [name, column] : options.map) {
+    const std::optional<double> factor = factor_alone(column);
+    if (!factor || !is_wanted(options, name)) {
+      continue;
+    }
+    if (!header.found.contains(name)) {
+      throw InputError(fmt::format("{}: no column for {}, which --map {}={} multiplies: expected one of {}", place,
+                                   name, name, column, core::listed(header.fields)));
+    }
+    const auto own = header.factors.emplace(name, 1.0).first;
+    own->second *= *factor;
+  }
+}
+
+}  // namespace
+
 CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, const std::string& place,
                           std::vector<std::string> units) {
   check_is_text(line, place);
@@ -436,6 +525,9 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
   header.fields = split_fields(line, header.separator);
   check_has_names(header.fields, place);
   for (const auto& [name, column] : options.map) {
+    if (factor_alone(column)) {
+      continue;
+    }
     const auto [field, factor] = find_field(header.fields, column) ? std::pair{column, 1.0} : split_factor(column);
     if (joint_place(field) && !find_field(header.fields, field)) {
       continue;  // joints of a JointState: a table has the columns under their own names
@@ -459,14 +551,16 @@ CsvHeader read_csv_header(std::string_view line, const CsvOptions& options, cons
   recognise(header, options, place, [&](std::size_t k) { return std::pair(column_of_field(meant(header, k)), 1.0); });
   recognise(header, options, place, [&](std::size_t k) { return foreign_column_of(meant(header, k)); });
   note_units(header, options);
-  if (!header.found.contains("t")) {
+  if (header.found.contains("t")) {
+    scale_found(header, options, place);
+  } else {
     std::string notes;
     for (const std::string& note : header.notes) {
       notes += "; " + note;
     }
-    throw InputError(fmt::format("{}: no column for t (time, s): expected one of {}{}; see --map t=COLUMN{}{}", place,
+    throw InputError(fmt::format("{}: no column for t (time, s): expected one of {}{}; see --map t=COLUMN{}{}{}", place,
                                  core::listed(header.fields), files::did_you_mean("time", header.fields), notes,
-                                 known_logger(header.fields)));
+                                 times_in_other_columns(header), known_logger(header.fields)));
   }
   return header;
 }
@@ -499,9 +593,9 @@ bool is_csv_content(std::string_view line) {
 
 namespace {
 
-/// Nothing, or one of the words NA, N/A, null and none in any case.
+/// Nothing, a dash, or one of the words NA, N/A, #N/A, null and none in any case.
 bool means_missing(std::string_view text) {
-  constexpr std::array<std::string_view, 5> words = {"", "na", "n/a", "null", "none"};
+  constexpr std::array<std::string_view, 8> words = {"", "na", "n/a", "null", "none", "#n/a", "-", "--"};
   return std::any_of(words.begin(), words.end(), [&](std::string_view word) {
     return std::equal(word.begin(), word.end(), text.begin(), text.end(),
                       [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); });
@@ -615,6 +709,17 @@ constexpr double day_of_1970 = 25569.0;  // of a spreadsheet, from 30 December 1
 
 }  // namespace
 
+namespace {
+
+/// The unit in which `t` is a time since 1970; nullptr where it is in none that is shorter than s.
+const CountUnit* unit_since_1970(double t) {
+  const auto unit =
+      std::ranges::find_if(count_units, [&](const CountUnit& of) { return is_since_1970(t * of.seconds); });
+  return unit == count_units.end() ? nullptr : &*unit;
+}
+
+}  // namespace
+
 /// Settles how times are written by the first of them: values_[0], and `count` where it is a whole number.
 void CsvRowReader::begin_clock(std::optional<std::int64_t> count) {
   constexpr double a_year = 3.2e7;  // s: later than 1971, whichever unit
@@ -641,6 +746,12 @@ void CsvRowReader::begin_clock(std::optional<std::int64_t> count) {
     if (since_1970 || !clock_.unit.empty()) {
       clock_.origin = common_origin(shared_origin_, second);
     }
+  } else if (const CountUnit* of = !count && time_factor_ == 1.0 && t > limits_[0] ? unit_since_1970(t) : nullptr) {
+    clock_.unit = of->name;
+    time_factor_ = of->seconds;
+    clock_.kind = Clock::Kind::epoch;
+    clock_.zone = "UTC";
+    clock_.origin = common_origin(shared_origin_, static_cast<std::int64_t>(std::floor(t * of->seconds)));
   } else if (!keep_seconds_) {
     const bool serial = time_factor_ == a_day;
     const double seconds = (t - (serial ? day_of_1970 : 0.0)) * time_factor_;
@@ -717,6 +828,45 @@ bool CsvRowReader::read_moment(std::string_view text, double& t) {
 
 namespace {
 
+/// `text` as a plain number would be written: a true minus sign as '-', a Fortran exponent as e, and no marks between
+/// groups of three digits, where a decimal mark (`point` or comma) or the mark itself tells them from one.
+std::string plainly(std::string_view text) {
+  std::string out(text);
+  const auto replace = [&](std::string_view from, std::string_view to) {
+    for (std::size_t at = out.find(from); at != std::string::npos; at = out.find(from)) {
+      out.replace(at, from.size(), to);
+    }
+  };
+  replace("\u2212", "-");
+  for (const std::string_view mark : {"\u202f", "\u00a0", "'", "\u2019"}) {
+    replace(mark, "");
+  }
+  if (const std::size_t d = out.find_first_of("dD"); d != std::string::npos && d > 0 && d + 1 < out.size()) {
+    out[d] = 'e';
+  }
+  const std::size_t comma = out.rfind(','), point = out.rfind('.');
+  if (comma != std::string::npos && point != std::string::npos) {
+    const char group = comma < point ? ',' : '.';
+    const std::size_t decimal = std::max(comma, point);
+    std::size_t digits = 0;
+    for (std::size_t k = decimal; k-- > 0;) {
+      if (out[k] == group) {
+        if (digits != 3) {
+          return out;
+        }
+        digits = 0;
+      } else {
+        ++digits;
+      }
+    }
+    if (digits >= 1 && digits <= 3) {
+      out.erase(std::remove(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(decimal), group),
+                out.begin() + static_cast<std::ptrdiff_t>(decimal));
+    }
+  }
+  return out;
+}
+
 /// Reads a number with one decimal comma, which is all of `text`; false where it is none.
 bool parse_decimal_comma(std::string_view text, double& value) {
   const std::size_t comma = text.find(',');
@@ -756,8 +906,15 @@ const char* CsvRowReader::read_odd_field(const char* p, const char* end, std::si
   }
   const std::string_view text(p, static_cast<std::size_t>(last - p));
   const bool is_time = slots_[field] == 0;
-  const bool point = p != last && files::parse_number(p, last, value) == last;
-  const bool comma = p != last && !point && !points_ && parse_decimal_comma(text, value);
+  std::string number(text);
+  bool point = p != last && files::parse_number(p, last, value) == last;
+  bool comma = p != last && !point && !points_ && parse_decimal_comma(text, value);
+  if (!point && !comma && text.find(':') == std::string_view::npos) {
+    number = plainly(text);
+    const char* const number_end = number.data() + number.size();
+    point = !number.empty() && number != text && files::parse_number(number.data(), number_end, value) == number_end;
+    comma = !point && !points_ && number != text && parse_decimal_comma(number, value);
+  }
   Fault fault = Fault::none;
   if (is_time && !point && !comma && read_moment(text, value)) {
     fault = Fault::none;
@@ -769,11 +926,10 @@ const char* CsvRowReader::read_odd_field(const char* p, const char* end, std::si
     fault = Fault::text;
   } else {
     commas_ = commas_ || comma;
-    points_ = points_ || (point && text.find('.') != std::string_view::npos);
+    points_ = points_ || (point && number.find('.') != std::string::npos);
     if (is_time && (clock_.kind != Clock::Kind::plain || time_factor_ != 1.0)) {
-      std::string plain(text);
-      std::ranges::replace(plain, ',', '.');
-      convert_time(plain);
+      std::ranges::replace(number, ',', '.');
+      convert_time(number);
     }
     if (!(std::abs(value) <= limits_[static_cast<std::size_t>(slots_[field])])) {
       fault = Fault::limit;
@@ -814,6 +970,9 @@ bool CsvRowReader::read_numbers(std::string_view line, std::size_t line_number, 
         "{}: {} fields: expected {}, as the header has ({}){}", cleaner_.at(line_number), fields, known, shown(line),
         separator_ == ',' && fields > known + 1 ? "; where numbers have decimal commas, write ; or tabs between them"
                                                 : ""));
+  }
+  if (defect.fault == Fault::text && split_fields(line, separator_) == fields_) {
+    return false;  // tables that were joined, each with its header
   }
   if (defect.fault == Fault::text || defect.fault == Fault::limit) {
     throw InputError(cleaner_.at(line_number) + ": " + describe(defect));

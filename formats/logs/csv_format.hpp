@@ -23,7 +23,8 @@ namespace wheelwright::logs {
 struct CsvOptions {
   /// Contract name (or a name in `extra`) -> column of the file (of a bag TOPIC.PATH, of an HDF5 file a dataset), for
   /// headers that no spelling covers (`--map name=column`). It goes before everything else. COLUMN*FACTOR multiplies
-  /// what stands in COLUMN, for logs in other units, where no column is called so. Of a bag also velocity[JOINT] or
+  /// what stands in COLUMN, for logs in other units, where no column is called so; *FACTOR alone the column that is
+  /// found without an entry. Of a bag also velocity[JOINT] or
   /// effort[JOINT,JOINT] without a topic: what has no such joints is read as if there were no such entry.
   std::map<std::string, std::string> map;
   /// Names in `map` that a file may lack the column of, where it has one called by the name itself: a robot file's
@@ -82,8 +83,18 @@ class HeadingUnit {
 /// Says of CsvOptions::or_by_name that a file has the column `name` instead of `field`.
 [[nodiscard]] std::string by_its_own_name(std::string_view field, std::string_view name);
 
+/// Whether a field of a header is called like the times of a log, in whichever unit.
+[[nodiscard]] bool names_time(const std::string& field);
+
+/// The character that separates the fields of a header line: the one of , ; tab and | that occurs most often outside
+/// quotes; the comma where none does.
+[[nodiscard]] char separator_of(std::string_view line);
+
 /// COLUMN and FACTOR of COLUMN*FACTOR; the whole and 1 where it is none.
 [[nodiscard]] std::pair<std::string, double> split_factor(const std::string& text);
+
+/// FACTOR of "*FACTOR", which multiplies the column that is found without it; nothing where `text` names a column.
+[[nodiscard]] std::optional<double> factor_alone(const std::string& text);
 
 /// Splits `line` at `separator`; quotes around a field are removed ("" inside them is one quote), and blanks around it.
 [[nodiscard]] std::vector<std::string> split_fields(std::string_view line, char separator);

@@ -457,13 +457,16 @@ class DatasetChooser {
     }
     const std::string home = home_of_time();
     for (const auto& [name, place] : options_.map) {
-      take_mapped(name, place, home);
+      if (!factor_alone(place)) {
+        take_mapped(name, place, home);
+      }
     }
     for (const Source& source : sources_) {
       if (source.home() == home) {
         recognise(source);
       }
     }
+    scale_found();
     for (const std::string& name : options_.extra) {
       take(name, named(name, home, name));
     }
@@ -517,7 +520,7 @@ class DatasetChooser {
   }
 
   [[nodiscard]] std::string home_of_time() {
-    if (const auto mapped = options_.map.find("t"); mapped != options_.map.end()) {
+    if (const auto mapped = options_.map.find("t"); mapped != options_.map.end() && !factor_alone(mapped->second)) {
       const std::string place = split_factor(mapped->second).first;
       for (const Source& source : sources_) {
         if (source.shown() == mapped->second || source.name() == mapped->second || source.shown() == place ||
@@ -559,6 +562,23 @@ class DatasetChooser {
     }
     throw InputError(fmt::format("{}: no dataset {} for column {}: the file has {}{}", path_, files::shown(place), name,
                                  core::listed(choice_.header), files::did_you_mean(place, choice_.header)));
+  }
+
+  /// Multiplies the columns of which the map gives no more than a factor.
+  void scale_found() {
+    for (const auto& [name, mapped] : options_.map) {
+      const std::optional<double> factor = factor_alone(mapped);
+      if (!factor || (options_.only && name != "t" && std::ranges::count(*options_.only, name) == 0)) {
+        continue;
+      }
+      const auto found = choice_.found.find(name);
+      if (found == choice_.found.end()) {
+        throw InputError(fmt::format("{}: no dataset for {}, which --map {}={} multiplies: the file has {}", path_,
+                                     name, name, mapped, core::listed(choice_.header)));
+      }
+      found->second.factor *= *factor;
+      choice_.notes.push_back(fmt::format("{} is {} times {:g}", name, found->second.shown(), found->second.factor));
+    }
   }
 
   void take_mapped(const std::string& name, const std::string& mapped, const std::string& home) {
@@ -607,7 +627,8 @@ class DatasetChooser {
 
   /// Whether a column is looked for by its name.
   [[nodiscard]] bool looked_for(const std::string& name) const {
-    return !options_.map.contains(name) &&
+    const auto mapped = options_.map.find(name);
+    return (mapped == options_.map.end() || factor_alone(mapped->second)) &&
            (!options_.only || name == "t" || std::ranges::find(*options_.only, name) != options_.only->end());
   }
 

@@ -78,6 +78,32 @@ void JointChoice::tell_unnamed() {
       view_.topic->name, view_.topic->name));
 }
 
+void JointChoice::tell_no_side(const std::vector<std::string>& joints, const std::vector<std::string>& right,
+                               const std::vector<std::string>& left) {
+  if (joints.size() < 2 || (!right.empty() && !left.empty())) {
+    return;
+  }
+  const auto mapped = options_.map.find("omega_r");
+  if (mapped != options_.map.end() && !factor_alone(mapped->second)) {
+    return;
+  }
+  std::string one = right.empty() ? joints.front() : right.front(), other = left.empty() ? joints.back() : left.front();
+  if (one == other || one.empty() || other.empty()) {
+    const std::string& topic = view_.topic->name;
+    choice_.notes.push_back(fmt::format(
+        "{}: its messages name the joints {}, which does not tell one from another: elements by their place do not "
+        "need names, where the right wheel is the second --map omega_r={}.velocity[1] --map tau_r={}.effort[1] --map "
+        "omega_l={}.velocity[0] --map tau_l={}.effort[0]",
+        topic, files::shown(core::listed(joints)), topic, topic, topic, topic));
+    return;
+  }
+  choice_.notes.push_back(fmt::format(
+      "the joints of {} are {}: their names do not say which wheel is right and which left; with the joints of both, "
+      "--map \"omega_r=velocity[{}]\" --map \"tau_r=effort[{}]\" --map \"omega_l=velocity[{}]\" --map "
+      "\"tau_l=effort[{}]\" reads them (the other way round where that is so; a gyro shows it)",
+      view_.topic->name, core::listed(joints), one, one, other, other));
+}
+
 void JointChoice::tell_steering() {
   constexpr double still = 0.05;  // rad
   std::vector<std::string> moving;
@@ -237,6 +263,9 @@ void JointChoice::settle(BagSource& source) {
     }
   }
   const JointPublisher* publisher = view_.joints.publisher_of(joints);
+  if (!joints.empty() && publisher == nullptr) {
+    refuse_apart(joints);
+  }
   if (joints.empty() || publisher == nullptr) {
     return;
   }
@@ -251,6 +280,24 @@ void JointChoice::settle(BagSource& source) {
     }
   }
   drop_columns(source, *publisher);
+}
+
+/// Throws where each of the joints is in messages of one publisher, but no message has all of them.
+void JointChoice::refuse_apart(const std::vector<std::string>& joints) const {
+  std::string where;
+  for (const std::string& joint : joints) {
+    const JointPublisher* const own = view_.joints.publisher_of({joint});
+    if (own == nullptr) {
+      return;
+    }
+    where += fmt::format("{}{} in those that name {}", where.empty() ? "" : ", ", joint, core::listed(own->names));
+  }
+  throw InputError(fmt::format(
+      "{}: no message of {} has all joints that are read ({}): expected both wheels in one message, as "
+      "joint_state_publisher makes them of several: `ros2 bag play` the recording with --remap {}:=/wheels, run `ros2 "
+      "run joint_state_publisher joint_state_publisher --ros-args -p source_list:=[/wheels] -p rate:=100`, which needs "
+      "the robot description, and record its topic",
+      path_, view_.topic->name, where, view_.topic->name));
 }
 
 void JointChoice::refuse_twice(const JointPublisher& publisher, const std::vector<std::string>& joints) const {
@@ -279,7 +326,8 @@ void JointChoice::drop_columns(BagSource& source, const JointPublisher& publishe
   const auto still = [&](const BagColumn& column) {
     const auto place = place_of(column);
     const auto mapped = options_.map.find(column.name);
-    const bool wanted = mapped != options_.map.end() && !joint_place(split_factor(mapped->second).first);
+    const bool wanted = mapped != options_.map.end() && !factor_alone(mapped->second) &&
+                        !joint_place(split_factor(mapped->second).first);
     if (!place || place->first == "effort" || wanted) {
       return false;
     }
@@ -331,7 +379,9 @@ bool JointChoice::wants_efforts() const {
   return std::ranges::all_of(std::array<std::string, 2>{"tau_r", "tau_l"}, [&](const std::string& name) {
     const auto mapped = options_.map.find(name);
     const bool wanted = !options_.only || std::ranges::count(*options_.only, name) > 0;
-    return mapped != options_.map.end() ? joint_place(split_factor(mapped->second).first).has_value() : wanted;
+    return mapped != options_.map.end() && !factor_alone(mapped->second)
+               ? joint_place(split_factor(mapped->second).first).has_value()
+               : wanted;
   });
 }
 
@@ -371,6 +421,44 @@ std::string JointChoice::cure(const BagSource& source, const JointPublisher& pub
                            wheels.empty() ? "tau_r" : wheels.front().first, view_.topic->name, array);
 }
 
+/// Whether messages that differ in nothing but the order of their joints go on from each other.
+bool JointChoice::are_one_publisher(const std::vector<const JointPublisher*>& publishers,
+                                    const std::vector<std::string>& joints) const {
+  const auto sorted = [](std::vector<std::string> names) {
+    std::ranges::sort(names);
+    return names;
+  };
+  struct Message {
+    std::size_t order = 0, at = 0;
+    const JointPublisher* of = nullptr;
+  };
+  std::vector<Message> messages;
+  for (const JointPublisher* p : publishers) {
+    if (p->frame != publishers.front()->frame || p->filled != publishers.front()->filled ||
+        sorted(p->names) != sorted(publishers.front()->names)) {
+      return false;
+    }
+    for (std::size_t k = 0; k < p->order.size(); ++k) {
+      messages.push_back({p->order[k], k, p});
+    }
+  }
+  std::ranges::sort(messages, {}, &Message::order);
+  std::vector<std::vector<double>> columns;
+  for (std::size_t a = 0; a < joint_arrays.size(); ++a) {
+    for (const std::string& joint : joints) {
+      std::vector<double>& column = columns.emplace_back();
+      for (const Message& message : messages) {
+        column.push_back((*message.of->numbers(a, joint))[message.at]);
+      }
+    }
+  }
+  std::vector<const std::vector<double>*> numbers;
+  for (const std::vector<double>& column : columns) {
+    numbers.push_back(&column);
+  }
+  return core::interleaved_rows(numbers).rows.empty();
+}
+
 /// Leaves out what comes from a second publisher of the same joints; throws where it cannot be told which is which.
 void JointChoice::leave_publishers(BagSource& source, const std::vector<std::string>& joints,
                                    const JointPublisher*& publisher) {
@@ -393,6 +481,14 @@ void JointChoice::leave_publishers(BagSource& source, const std::vector<std::str
   }
   if (rivals.size() > 1 && !moving.empty()) {
     const std::vector<const JointPublisher*>& taken = moving.size() > 1 && driving.size() == 1 ? driving : moving;
+    if (taken.size() > 1 && are_one_publisher(taken, joints)) {
+      choice_.notes.push_back(
+          fmt::format("{}: its messages name the joints in different orders: each number was read by "
+                      "its own name",
+                      view_.topic->name));
+      leave_constant(source, joints, *publisher);
+      return;
+    }
     if (taken.size() > 1) {
       std::vector<std::string> shown;
       for (const JointPublisher* p : moving) {

@@ -28,6 +28,9 @@ class JointChoice {
 
   /// Says that messages name no joint.
   void tell_unnamed();
+  /// Says where no name of the `joints` tells the right or the left wheel, with the --map that does.
+  void tell_no_side(const std::vector<std::string>& joints, const std::vector<std::string>& right,
+                    const std::vector<std::string>& left);
   /// Contradicts where steering joints move.
   void tell_steering();
   /// Takes joints away from sides that have several: those that stand still while others turn, have no effort that
@@ -51,6 +54,9 @@ class JointChoice {
   [[nodiscard]] std::string uneven_words(const JointPublisher& publisher, std::size_t array) const;
   [[nodiscard]] std::string cure(const BagSource& source, const JointPublisher& publisher, std::size_t array) const;
   void leave_publishers(BagSource& source, const std::vector<std::string>& joints, const JointPublisher*& publisher);
+  void refuse_apart(const std::vector<std::string>& joints) const;
+  [[nodiscard]] bool are_one_publisher(const std::vector<const JointPublisher*>& publishers,
+                                       const std::vector<std::string>& joints) const;
   void leave_constant(BagSource& source, const std::vector<std::string>& joints, const JointPublisher& publisher);
   [[noreturn]] void refuse_publishers(const std::string& evidence) const;
 

@@ -250,12 +250,40 @@ int row_weight(std::string_view name) {
                                                             : 1;
 }
 
+namespace {
+
+// What names of joints call the sides: parts of a name, and whole words of it.
+constexpr std::array<std::string_view, 16> right_parts = {"right",  "rechte", "rechts", "droit", "derech", "direit",
+                                                          "destra", "destro", "dcho",   "dcha",  "prawy",  "prawe",
+                                                          "prawa",  "прав",   "右",     "오른"};
+constexpr std::array<std::string_view, 15> left_parts = {"left",    "linke",   "links", "gauche", "izquierd",
+                                                         "esquerd", "sinistr", "izdo",  "izda",   "lewy",
+                                                         "lewe",    "lewa",    "лев",   "左",     "왼"};
+constexpr std::array<std::string_view, 9> right_words = {"r", "fr", "rr", "br", "mr", "rf", "dx", "rwheel", "rmotor"};
+constexpr std::array<std::string_view, 11> left_words = {"l",  "fl", "rl", "bl",     "ml",    "lf",
+                                                         "lr", "lb", "sx", "lwheel", "lmotor"};
+
+}  // namespace
+
 std::string side_of_joint(const std::string& name) {
   const std::vector<std::string> words = words_of(name);
   const std::string plain = plain_name(name);
-  const bool right = has_word(words, "right") || has_word(words, "r") || plain.find("right") != std::string::npos;
-  const bool left = has_word(words, "left") || has_word(words, "l") || plain.find("left") != std::string::npos;
+  const auto has_part = [&](std::string_view part) { return plain.find(part) != std::string::npos; };
+  const auto is_word = [&](std::string_view word) { return has_word(words, word); };
+  bool right = std::ranges::any_of(right_parts, has_part), left = std::ranges::any_of(left_parts, has_part);
+  if (!right && !left) {  // only then letters count: they may be those of a robot's name
+    right = std::ranges::any_of(right_words, is_word);
+    left = std::ranges::any_of(left_words, is_word);
+  }
   return right == left ? "" : right ? "r" : "l";
+}
+
+bool names_wheel(const std::string& plain) {
+  constexpr std::array<std::string_view, 9> parts = {"wheel", "whl",  "rueda", "roue", "ruota",
+                                                     "roda_", "wiel", "колес", "轮"};
+  const std::vector<std::string> words = words_of(plain);
+  return std::ranges::any_of(parts, [&](std::string_view part) { return plain.find(part) != std::string::npos; }) ||
+         has_word(words, "rad") || has_word(words, "kolo") || has_word(words, "roda");
 }
 
 std::string plain_name(std::string_view text) {
@@ -381,6 +409,17 @@ void require_columns(const LogSource& source, const std::vector<std::string>& na
 }
 
 void require_columns(const RecordedLog& log, const std::vector<std::string>& names) {
+  const auto demand = [&](const LogFileReport& file) {
+    try {
+      require_columns(log, names, file.path, file.header);
+    } catch (const InputError& error) {
+      std::string ways_out;
+      for (const std::string& note : file.notes) {
+        ways_out += note.find("--map") != std::string::npos ? "; " + note : "";
+      }
+      throw InputError(error.what() + ways_out);
+    }
+  };
   for (const LogFileReport& file : log.report().files) {
     const bool lacks = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
       const auto alternatives = alternatives_of(name);
@@ -392,10 +431,10 @@ void require_columns(const RecordedLog& log, const std::vector<std::string>& nam
       });
     });
     if (lacks) {
-      require_columns(log, names, file.path, file.header);
+      demand(file);
     }
   }
-  require_columns(log, names, log.report().files.front().path, log.report().files.front().header);
+  demand(log.report().files.front());
 }
 
 }  // namespace wheelwright::logs

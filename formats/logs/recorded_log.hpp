@@ -48,6 +48,9 @@ struct LogColumn {
 /// The sides that `name` of a joint tells: "r", "l" or nothing.
 [[nodiscard]] std::string side_of_joint(const std::string& name);
 
+/// Whether a joint's name (plain_name()) says that it is a wheel, in one of the languages of side_of_joint().
+[[nodiscard]] bool names_wheel(const std::string& plain);
+
 /// Count of a defect, and the place of the first one.
 struct Occurrences {
   std::size_t count = 0;

@@ -265,11 +265,22 @@ class KeptRows final : public LogSource {
   std::size_t position_ = 0;
 };
 
-/// The share for core::least_leap() of a column that no effort makes leap.
+constexpr double longest_kick =
+    0.1 + 1e-6;  ///< s around rows in which an effort leaps, which may be true if it is longer
+
+bool is_effort(std::string_view name) {
+  return name == "effort" || std::ranges::any_of(std::array<std::string_view, 3>{"tau_", "current_", "voltage_"},
+                                                 [&](std::string_view stem) { return name.starts_with(stem); });
+}
+
+bool is_angle(std::string_view name) { return name == "phi_r" || name == "phi_l" || name == "position"; }
+
+/// The share for core::least_leap() of a column that no drive makes leap.
 std::optional<double> leap_share(std::string_view name) {
   return name == "omega_r" || name == "omega_l" || name == "velocity" ? std::optional(core::kSpeedLeap)
-         : name == "phi_r" || name == "phi_l" || name == "position"   ? std::optional(core::kAngleLeap)
+         : is_angle(name)                                             ? std::optional(core::kAngleLeap)
          : name == "gyro_z"                                           ? std::optional(core::kRateLeap)
+         : is_effort(name)                                            ? std::optional(core::kEffortLeap)
                                                                       : std::nullopt;
 }
 
@@ -306,6 +317,7 @@ class WithoutLeaps final : public RowWalk {
   struct Row {
     double t = 0.0;
     bool starts = false;
+    bool jumped = false;  ///< starts, and not for its time: a wheel angle jumps
     std::vector<double> values;
   };
 
@@ -317,28 +329,62 @@ class WithoutLeaps final : public RowWalk {
         Row& row = rows_[count_++];
         row.t = walk_->t();
         row.starts = outcome == RowOutcome::new_segment;
+        const double step = count_ > 1 ? row.t - rows_[count_ - 2].t : 0.0;
+        row.jumped = row.starts && step > 0.0 && step <= longest_step_;
         std::copy_n(walk_->values(), row.values.size(), row.values.begin());
       }
     }
   }
 
-  /// Takes away the rows behind the first that leap; false where none do.
-  bool leave_out() {
-    std::size_t same = std::min<std::size_t>(count_, 1);  // rows of the segment of the first
-    while (same < count_ && !rows_[same].starts) {
+  /// Rows behind the first that leap in column `c`; 0 where none do.
+  [[nodiscard]] std::size_t leap_of(std::size_t c) const {
+    const bool angle = is_angle(names_[c]);
+    std::size_t same = std::min<std::size_t>(count_, 1);  // rows of the segment of the first, but for jumps of angles
+    while (same < count_ && (!rows_[same].starts || (angle && rows_[same].jumped))) {
       ++same;
     }
+    std::array<double, core::kLongestLeap + 2> window{};
+    for (std::size_t k = 0; k < same; ++k) {
+      window[k] = rows_[k].values[c];
+    }
+    const std::size_t leap = core::leap_behind(std::span(window).first(same), least_[c]);
+    if (leap == 0 || (is_effort(names_[c]) && rows_[leap + 1].t - rows_[0].t > longest_kick)) {
+      return 0;
+    }
+    for (std::size_t k = 1; k <= leap + 1; ++k) {
+      if (rows_[k].jumped) {
+        return goes_on(leap + 1) ? leap : 0;
+      }
+    }
+    return leap;
+  }
+
+  /// Whether all angles of row `k` go on from those of the first row.
+  [[nodiscard]] bool goes_on(std::size_t k) const {
     for (std::size_t c = 0; c < names_.size(); ++c) {
-      if (!std::isfinite(least_[c])) {
-        continue;
+      const double step = std::abs(rows_[k].values[c] - rows_[0].values[c]);
+      if ((is_angle(names_[c]) && !(step < least_[c])) || (names_[c] == "theta" && !(step < std::numbers::pi))) {
+        return false;
       }
-      std::array<double, core::kLongestLeap + 2> window{};
-      for (std::size_t k = 0; k < same; ++k) {
-        window[k] = rows_[k].values[c];
-      }
-      const std::size_t leap = core::leap_behind(std::span(window).first(same), least_[c]);
+    }
+    return true;
+  }
+
+  /// Takes away the rows behind the first that leap; false where none do.
+  bool leave_out() {
+    for (std::size_t c = 0; c < names_.size(); ++c) {
+      const std::size_t leap = std::isfinite(least_[c]) ? leap_of(c) : 0;
       if (leap > 0) {
         note(&LogReport::leaps, leap, c);
+        // The way back of a single row is seen as the rate of the next, which the row behind contradicts.
+        const bool echo = leap + 2 < count_ && rows_[leap + 2].jumped && goes_on(leap + 2);
+        for (std::size_t k = 1; k <= leap + (echo ? 2 : 1); ++k) {
+          if (rows_[k].jumped && report_ != nullptr) {
+            report_->jumps.first = --report_->jumps.count > 0 ? report_->jumps.first : std::string();
+          }
+          rows_[k].starts = rows_[k].starts && !rows_[k].jumped;
+          rows_[k].jumped = false;
+        }
         if (report_ != nullptr) {
           report_->rows -= leap;
         }
@@ -507,7 +553,17 @@ void RowLog::keep(const RowWalk& walk, bool starts) {
 }
 
 void RowLog::judge() const {
+  constexpr std::size_t fewest_duplicates = 20;
+  constexpr double most_resets = 0.1;  // of the rows
+  const std::string in_order =
+      "; where t is the first column of a table, (head -n 1 LOG; tail -n +2 LOG | sort -g) > sorted.csv sorts it";
   const std::string where = files_[0]->path() + (files_.size() > 1 ? " and the other files" : "");
+  if (report_.duplicates.count > fewest_duplicates && 3 * report_.duplicates.count > 2 * report_.rows_read) {
+    throw InputError(fmt::format(
+        "{}: {} of {} rows have the time of the row before: expected times with more decimals, as fine as the rows "
+        "follow each other (first at {})",
+        where, report_.duplicates.count, report_.rows_read, report_.duplicates.first));
+  }
   if (report_.rows < std::max<std::size_t>(options_.min_rows, 1)) {
     std::string message = fmt::format("{}: {} usable rows of {}: expected at least {}", where, report_.rows,
                                       report_.rows_read, options_.min_rows);
@@ -516,14 +572,15 @@ void RowLog::judge() const {
     }
     throw InputError(message);
   }
-  if (3 * report_.duplicates.count > 2 * report_.rows_read) {
-    throw InputError(fmt::format(
-        "{}: {} of {} rows have the time of the row before: expected times with more decimals, as fine as the rows "
-        "follow each other (first at {})",
-        where, report_.duplicates.count, report_.rows_read, report_.duplicates.first));
-  }
   if (report_.rows > 1 && !(report_.median_step > 0.0) && report_.resets.count > 0) {
-    throw InputError(where + ": column t never increases: expected times in seconds, one row after the other");
+    throw InputError(where + ": column t never increases: expected times in seconds, one row after the other" +
+                     in_order);
+  }
+  if (static_cast<double>(report_.resets.count) > most_resets * static_cast<double>(report_.rows)) {
+    throw InputError(
+        fmt::format("{}: time goes back in {} of {} rows (first at {}): expected rows in the order of their "
+                    "times{}",
+                    where, report_.resets.count, report_.rows, report_.resets.first, in_order));
   }
 }
 

@@ -285,7 +285,7 @@ TEST_F(CsvDialects, PointsAndCommasInOneFileAreRefused) {
               AllOf(HasSubstr("log.csv:32"), HasSubstr("'1,234': expected a number with a decimal point")));
   EXPECT_THAT(input_error([&] { read(table("1,5", "1.234")); }),
               AllOf(HasSubstr("log.csv:32"), HasSubstr("expected a number with a decimal comma")));
-  EXPECT_THAT(input_error([&] { read(table("1,5", "1.234,5")); }), HasSubstr("log.csv:32"));
+  EXPECT_EQ(read(table("1,5", "1.234,5")).columns[0][30], 1234.5);  // a group of thousands
   EXPECT_THAT(input_error([&] { read("t,omega_r,tau_r\n0,01,1,5,2,5\n"); }), HasSubstr("decimal commas"));
 }
 
@@ -331,6 +331,83 @@ TEST_F(CsvDialects, RosTopicEchoIsNamedWithWhatMakesATableOfIt) {
                            HasSubstr("echo \"t,phi_l,omega_l,tau_l,phi_r,omega_r,tau_r\""),
                            HasSubstr("$1,$2,$6,$8,$10,$7,$9,$11")));
   EXPECT_THAT(input_error([&] { read("1795941600,10000000,base,0.1\n"); }), HasSubstr("ros2 bag record"));
+}
+
+TEST_F(CsvDialects, HeadersBehindTitlesAndInCommentsAndColumnsBetweenBlanksAreRead) {
+  const auto table = [](const std::string& head, const std::string& separator, const std::string& end = "\n") {
+    std::string text = head;
+    for (int k = 0; k < rows; ++k) {
+      text += fmt::format("{:.2f}{}{}{}{}{}", 0.01 * k, separator, speed(k), separator, torque(k), end);
+    }
+    return text;
+  };
+  for (const std::string& text :
+       {table("# t,omega_r,tau_r\n", ","), table("# made by me\n#t;omega_r;tau_r\n", ";"),
+        table("# t omega_r tau_r\n", " "), table("t   omega_r  tau_r\n", "   "), table("t|omega_r|tau_r\n", "|"),
+        table("Data logger v1.3\nDate: 2026-01-02\nt,omega_r,tau_r\n", ","),
+        table("t,omega_r,tau_r\n", ",") + "t,omega_r,tau_r\n"}) {
+    expect_drive(read(text), 1e-9, text.substr(0, 40));
+  }
+}
+
+TEST_F(CsvDialects, NumbersOfAllCountriesAreTheSame) {
+  const auto text = [](const std::string& header, const std::function<std::string(double)>& number) {
+    std::string out = header;
+    for (int k = 0; k < rows; ++k) {
+      out += fmt::format("{};{};{}\n", number(1234.0 + 0.01 * k), number(speed(k)), number(torque(k)));
+    }
+    return out;
+  };
+  const auto replaced = [](std::string number, const std::string& from, const std::string& to) {
+    const std::size_t at = number.find(from);
+    return at == std::string::npos ? number : number.replace(at, from.size(), to);
+  };
+  const std::string header = "t;omega_r;tau_r\n";
+  const auto plain = [](double v) { return fmt::format("{:.4f}", v); };
+  const auto grouped = [&](const std::string& group, const std::string& decimal) {
+    return [=](double v) {
+      const std::string number = plain(v);
+      return replaced(replaced(number, ".", decimal), "1234", "1" + group + "234");
+    };
+  };
+  for (const auto& number : std::vector<std::function<std::string(double)>>{
+           grouped(".", ","), grouped(",", "."), grouped("'", "."), grouped("\u202f", ","), grouped("\u00a0", ","),
+           [&](double v) { return replaced(plain(v), "-", "\u2212"); },
+           [](double v) { return fmt::format("{:.8e}", v).replace(fmt::format("{:.8e}", v).find('e'), 1, "D"); }}) {
+    expect_drive(read(text(header, number)), 1e-6, number(-1234.5));
+  }
+}
+
+TEST_F(CsvDialects, AFactorAloneMultipliesTheColumnThatIsFound) {
+  CsvOptions options;
+  options.map = {{"omega_r", "*2"}, {"t", "*0.001"}};
+  std::string text = "time,right_wheel_velocity,tau_r\n";
+  for (int k = 0; k < rows; ++k) {
+    text += fmt::format("{},{},{}\n", 10 * k, 0.5 * speed(k), torque(k));
+  }
+  expect_drive(read(text, options), 1e-9, "factors");
+  options.map = {{"gyro_z", "*2"}};
+  EXPECT_THAT(input_error([&] { read(text, options); }), HasSubstr("no column for gyro_z, which --map gyro_z=*2"));
+}
+
+TEST_F(CsvDialects, MillisecondsSince1970MayHaveDecimals) {
+  std::string text = "t,omega_r,tau_r\n";
+  for (int k = 0; k < rows; ++k) {
+    text += fmt::format("{:.3f},{},{}\n", 1e3 * static_cast<double>(start) + 10.0 * k, speed(k), torque(k));
+  }
+  expect_drive(read(text), 1e-5, "ms");
+}
+
+TEST_F(CsvDialects, WhatMakesTimesIsSaidWhereNoColumnHasThem) {
+  EXPECT_THAT(input_error([&] { read("stamp.sec,stamp.nanosec,omega_r,tau_r\n1,0,1,1\n"); }),
+              HasSubstr("sprintf(\"%d.%09d\",$1,$2)"));
+  EXPECT_THAT(input_error([&] { read(",omega_r,tau_r\n0,1,1\n"); }), HasSubstr("sed '1s/^/t/'"));
+  EXPECT_THAT(input_error([&] { read("index,omega_r,tau_r\n0,1,1\n"); }), HasSubstr("--map t=\"index*0.01\""));
+  std::string back = "t,omega_r,tau_r\n";
+  for (int k = 0; k < rows; ++k) {
+    back += fmt::format("{:.2f},{},{}\n", 0.01 * (k ^ 1), speed(k), torque(k));
+  }
+  EXPECT_THAT(input_error([&] { read(back); }), AllOf(HasSubstr("time goes back"), HasSubstr("sort -g")));
 }
 
 TEST_F(CsvDialects, ARobotFilesColumnsAlsoTakeATableUnderItsOwnNames) {

@@ -273,6 +273,64 @@ TEST_F(JointStates, NamesThatAreMissingOrStandTwiceAreTold) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("name no joint"), HasSubstr("--map omega_r=/joint_states.velocity[1]")));
 }
 
+TEST_F(JointStates, NamesInOtherLanguagesTellTheSides) {
+  for (const auto& [right, left] : {std::pair("rueda_derecha_joint", "rueda_izquierda_joint"),
+                                    {"roue_droite", "roue_gauche"},
+                                    {"rechtes_rad", "linkes_rad"},
+                                    {"ruota_destra", "ruota_sinistra"},
+                                    {"prawe_kolo", "lewe_kolo"},
+                                    {"右车轮", "左车轮"},
+                                    {"rwheel", "lwheel"},
+                                    {"fr_wheel", "fl_wheel"},
+                                    {"robot_r/right_wheel", "robot_r/left_wheel"}}) {
+    SCOPED_TRACE(right);
+    items.clear();
+    publish({left_wheel(left), right_wheel(right)});
+    expect_wheels(read().table);
+  }
+}
+
+TEST_F(JointStates, NamesWithoutASideAreToldWithTheMapThatReadsThem) {
+  publish({right_wheel("motor_1"), left_wheel("motor_2")});
+  LogOptions options;
+  options.only = std::vector<std::string>{"omega_r", "omega_l", "tau_r", "tau_l"};
+  EXPECT_THAT(refusal(options), HasSubstr("--map"));
+  options.map = {{"omega_r", "velocity[motor_1]"},
+                 {"tau_r", "effort[motor_1]"},
+                 {"omega_l", "velocity[motor_2]"},
+                 {"tau_l", "effort[motor_2]"}};
+  expect_wheels(read(options).table);
+}
+
+TEST_F(JointStates, JointsInAnyOrderOfOnePublisherAreReadByTheirNames) {
+  for (std::size_t k = 0; k < 3000; ++k) {
+    const double t = static_cast<double>(k) / rate;
+    add(t, message(t, "",
+                   k % 3 == 1 ? std::vector{right_wheel(), left_wheel()} : std::vector{left_wheel(), right_wheel()}));
+  }
+  const Log log = read();
+  expect_wheels(log.table);
+  EXPECT_THAT(log.report.files[0].notes, Contains(HasSubstr("in different orders")));
+}
+
+TEST_F(JointStates, WheelsInMessagesOfTheirOwnAreRefusedForThat) {
+  publish({right_wheel()});
+  beside({left_wheel()}, 1);
+  EXPECT_THAT(refusal(), HasSubstr("no message of /joint_states has all joints"));
+}
+
+TEST_F(JointStates, AFactorAloneMultipliesWhatIsFound) {
+  publish({left_wheel(), right_wheel()});
+  LogOptions options;
+  options.map = {{"tau_r", "*0.5"}, {"tau_l", "*-1"}};
+  const LogTable log = read(options).table;
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    ASSERT_NEAR(log.column("tau_r")[k], 0.5 * right_effort(log.t[k]), 1e-6);
+    ASSERT_NEAR(log.column("tau_l")[k], -left_effort(log.t[k]), 1e-6);
+    ASSERT_NEAR(log.column("omega_r")[k], right_speed(log.t[k]), 1e-6);
+  }
+}
+
 TEST_F(JointStates, MotionThatStandsStillBesideMotionIsNotRead) {
   publish({{"right_wheel", none, right_speed, right_effort}, {"left_wheel", none, left_speed, left_effort}});
   Log log = read();

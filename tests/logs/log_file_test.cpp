@@ -812,14 +812,14 @@ TEST_F(LogFile, PiecesOfHdf5ThatWereNeverWrittenAreRefused) {
   EXPECT_THAT(input_error([&] { read({file}); }), HasSubstr("were never written or are lost"));
 }
 
-// Of speeds that leap in a row or two at known places: what is left are all other rows, as they were, in any blocks.
+// Of speeds and efforts that leap in a row or two at known places: what is left are all other rows, as they were, in any blocks.
 TEST_F(LogFile, RowsThatLeapAreLeftOutAndCountedOnRequest) {
   std::string text = "t,omega_r,omega_l,tau_r,tau_l\n";
-  const std::vector<int> leaps = {40, 41, 90, 150, 300, 302, 398};
+  const std::vector<int> leaps = {40, 41, 60, 90, 150, 300, 302, 398};
   for (int k = 0; k < 400; ++k) {
     const bool leap = std::ranges::find(leaps, k) != leaps.end();
     const double t = 0.01 * k + (k < 200 ? 0.0 : 5.0), speed = 5.0 * std::sin(t);
-    text += fmt::format("{:.2f},{},{},{},1\n", t, leap && k % 2 == 0 ? 400.0 : speed,
+    text += fmt::format("{:.2f},{},{},{},1\n", t, leap && k % 2 == 0 && k != 60 ? 400.0 : speed,
                         leap && k % 2 == 1 ? -90.0 : speed, k == 60 ? 99.0 : 1.0);
   }
   const auto file = put("leaps.csv", text);
@@ -839,15 +839,48 @@ TEST_F(LogFile, RowsThatLeapAreLeftOutAndCountedOnRequest) {
       ASSERT_LT(row, left.rows());
       EXPECT_EQ(left.t[row], as_logged.t[k]);
       EXPECT_EQ(left.columns[0][row], as_logged.columns[0][k]);
-      EXPECT_EQ(left.columns[2][row], as_logged.columns[2][k]);  // efforts may leap
+      EXPECT_EQ(left.columns[2][row], as_logged.columns[2][k]);
       ++row;
     }
     EXPECT_EQ(left.rows(), row);
-    EXPECT_EQ(left.segment_starts, (std::vector<std::size_t>{0, 196}));
+    EXPECT_EQ(left.segment_starts, (std::vector<std::size_t>{0, 195}));
     EXPECT_EQ(log->report().leaps.count, leaps.size());
     EXPECT_EQ(log->report().rows, row);
     EXPECT_EQ(log->report().rows_read, 400U);
     EXPECT_THAT(log->report().leaps.first, AllOf(HasSubstr("leaps.csv"), HasSubstr("t = 0.4 s, column omega_r")));
+  }
+}
+
+// An angle that leaps and is back cuts nothing, and a counter that is set back does.
+TEST_F(LogFile, AnglesThatLeapAreLeftOutAndCutNothing) {
+  std::string text = "t,phi_r,phi_l,tau_r,tau_l\n";
+  for (int k = 0; k < 400; ++k) {
+    const double t = 0.01 * k, angle = 5.0 * t - (k >= 250 ? 10.0 : 0.0);
+    text += fmt::format("{:.2f},{:.6f},{:.6f},{},1\n", t, angle + (k == 100 || k == 101 ? 80.0 : 0.0),
+                        5.0 * t - (k == 300 ? 60.0 : 0.0), std::sin(t));
+  }
+  LogOptions options;
+  options.leaps = false;
+  const auto log = open_log({put("angles.csv", text)}, options);
+  EXPECT_EQ(log->report().leaps.count, 3U);
+  EXPECT_EQ(log->report().jumps.count, 1U);
+  const LogTable left = read_all(*log);
+  EXPECT_EQ(left.rows(), 397U);
+  EXPECT_EQ(left.segment_starts, (std::vector<std::size_t>{0, 248}));
+}
+
+// Efforts may leap for longer, as a robot that starts and stops does.
+TEST_F(LogFile, EffortsThatLeapForATenthOfASecondAndMoreStay) {
+  for (const double step : {0.01, 0.1}) {
+    std::string text = "t,omega_r,omega_l,tau_r,tau_l\n";
+    for (int k = 0; k < 2000; ++k) {
+      text += fmt::format("{:.2f},{},{},{},1\n", step * k, std::sin(0.01 * k), std::cos(0.01 * k),
+                          k == 900 ? 99.0 : std::sin(0.01 * k));
+    }
+    LogOptions options;
+    options.leaps = false;
+    EXPECT_EQ(open_log({put(fmt::format("efforts_{}.csv", step), text)}, options)->report().leaps.count,
+              step < 0.05 ? 1U : 0U);
   }
 }
 
