@@ -174,10 +174,15 @@ class Improvement {
     }
     add_to_theta("viscous_yaw", 0.5 * drive_.lever_arm * drive_.track_width * along);
   }
+  // Of viscous friction what acts in the joints as the cause has it, times `factor`; what acts on the body stays.
+  void scale_joint_friction(std::string_view name, double factor) {
+    const double on_body = catalogue::friction_on_body(cause_->effect, cause_->shape);
+    scale(name, on_body + (1.0 - on_body) * factor);
+  }
   void grow_wheels(double factor) {
     improved_.wheel_radius *= factor;
     for (const char* name : {"viscous_linear", "viscous_x", "viscous_y", "viscous_yaw"}) {
-      scale(name, 1.0 / (factor * factor));
+      scale_joint_friction(name, 1.0 / (factor * factor));
     }
   }
 
@@ -268,7 +273,8 @@ class Improvement {
   bool keep_joints() {
     const double* const viscous = find("viscous_linear");
     const Eigen::Vector2d e = coefficient(0) * sides(*cause_);
-    const double b = viscous != nullptr ? -drive_.wheel_radius * *viscous * (e[0] - e[1]) : 0.0;
+    const double in_joints = 1.0 - catalogue::friction_on_body(cause_->effect, cause_->shape);
+    const double b = viscous != nullptr ? -drive_.wheel_radius * in_joints * *viscous * (e[0] - e[1]) : 0.0;
     // Inertia of the joints, J_R − J_L more at the right: −r m b = (J_R − J_L) D/(2 r), as of a centre of mass at b.
     const Eigen::Vector2d inertia = coefficient(1) * sides(*cause_);
     const double offset = find("mass") == nullptr
@@ -452,7 +458,7 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
        {.change =
             [](I& r) {
               r.improved_.track_width *= 1.0 + r.fitted(0);
-              r.scale("viscous_yaw", std::pow(1.0 + r.fitted(0), 2));
+              r.scale_joint_friction("viscous_yaw", std::pow(1.0 + r.fitted(0), 2));
               r.add("yaw_inertia", r.fitted(1) * r.drive_.physical("yaw_inertia"));
             }}},
       {"coulomb", {.convert = [](I& r) { return r.linear_all(1.0); }}},
@@ -553,8 +559,7 @@ const std::map<std::string, Improvement::Way>& Improvement::ways() {
         .adds_up = true,
         .beside = [](I& r) { return r.keep_joints(); }}},
       {"encoder_scale",
-       {.change = [](I& r) { r.add_armature(r.fitted(1) * sides(*r.cause_).sum()); },
-        .convert =
+       {.convert =
             [](I& r) {
               const Eigen::Vector2d e = r.coefficient(0) * sides(*r.cause_);
               r.set("s_R", -e[0] / (1.0 + e[0]));

@@ -26,9 +26,9 @@ namespace wheelwright::gap {
 /// the causes explain is in addition to Yθ, parametric ones included.
 ///
 /// - Parametric causes and what comes beside an effect (a changed inertia) become nominal values; wheel_radius and
-///   track_width change these keys. Friction is in the joints: viscous values follow the geometry so that the joints'
-///   friction stays; where the wheels' radii differ this takes a viscous_asymmetric too, and their inertia a
-///   com_lateral.
+///   track_width change these keys. Friction that is in the joints as they were found (catalogue::friction_on_body):
+///   viscous values follow the geometry so that it stays; where the wheels' radii differ this takes a
+///   viscous_asymmetric too, and their inertia a com_lateral.
 /// - All others become `effects:` in the parametrisation of effect_law.hpp. With e_R, e_L at the wheels:
 ///   torque_gain_asymmetric has g = (e_L − e_R)/(2 + e_R + e_L) and θ·2(1 + e_R)(1 + e_L)/(2 + e_R + e_L),
 ///   wheel_radius_asymmetric ε = (e_R − e_L)/(2 + e_R + e_L) and r(1 + (e_R + e_L)/2), viscous_asymmetric b = e_R − e_L

@@ -170,7 +170,7 @@ CauseSet evaluate(const CandidateTable& table, std::vector<std::size_t> members,
   const std::size_t theta = (base == BaseModel::refitted ? table.base : table.unknown).size();
   std::size_t numbers = subset.columns.size() - theta;
   for (const std::size_t c : members) {
-    numbers += table.candidates[c].shape.size();
+    numbers += table.candidates[c].shape.size() - table.candidates[c].beside;
   }
   set.coefficients = static_cast<double>(numbers);
   set.members = std::move(members);

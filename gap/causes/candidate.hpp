@@ -25,8 +25,9 @@ struct Candidate {
   std::vector<int> sign;          ///< of each column's coefficient, as Subset::sign
   bool unit_coefficient = false;  ///< the columns enter with the coefficient 1
   std::vector<std::size_t>
-      own{};  ///< those of the columns that are the effect itself, not what comes along with it; empty:
-              ///< all
+      own{};               ///< those of the columns that are the effect itself, not what comes along with it; empty:
+                           ///< all
+  std::size_t beside = 0;  ///< of the shapes: not counted as numbers (ShapeParameter::beside)
 };
 
 /// All candidates of a gap analysis. Keeps references to the Gram matrices and their rows.

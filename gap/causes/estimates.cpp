@@ -206,7 +206,7 @@ std::vector<GapEstimate> numbers_of(const Effect& effect, const Eigen::VectorXd&
   for (std::size_t s = 0; s < effect.shapes.size(); ++s) {
     const bool named = std::any_of(numbers.begin(), numbers.end(),
                                    [&](const GapEstimate& number) { return number.name == effect.shapes[s].name; });
-    if (named) {
+    if (named || effect.shapes[s].beside) {
       continue;
     }
     double half = 0.0;

@@ -28,19 +28,20 @@ Signal rim_speed(const Drive& drive, std::size_t joint) {
 }
 
 // The rim of one wheel moves faster by `speed` than its joint shows.
-Column unseen_rim_speed(const Drive& drive, std::size_t joint, const Signal& speed, bool friction) {
+Column unseen_rim_speed(const Drive& drive, std::size_t joint, const Signal& speed, double friction) {
   return joint == 0 ? unseen_rim_speeds(drive, speed, {}, friction) : unseen_rim_speeds(drive, {}, speed, friction);
 }
 
 // A wheel whose radius is larger by the share `growth` (a number, or one per instant): its rim is faster, and the same
-// force takes more torque. Friction is in the joints and stays as it is.
-Column larger_wheel(const Drive& drive, std::size_t joint, const Signal& growth) {
-  Column column = unseen_rim_speed(drive, joint, rim_speed(drive, joint).cwiseProduct(growth), false);
-  add(column, at_joints(drive, only(drive, joint, inertial_efforts(drive)[joint].cwiseProduct(growth))));
+// force on the ground takes more torque. Of the viscous friction the share `friction` is such a force; that in the
+// joints stays as it is.
+Column larger_wheel(const Drive& drive, std::size_t joint, const Signal& growth, double friction) {
+  Column column = unseen_rim_speed(drive, joint, rim_speed(drive, joint).cwiseProduct(growth), friction);
+  add(column, at_joints(drive, only(drive, joint, inertial_efforts(drive, friction)[joint].cwiseProduct(growth))));
   return column;
 }
 
-// The joints' own inertia is a part of the base model's that does not grow with a wheel or a scale.
+// The joints' own inertia is a part of the base model's that does not grow with a wheel.
 EffectParameter armature_change() { return {"armature_change", "kg·m²", 0, true}; }
 
 Effect com_longitudinal() {
@@ -81,7 +82,6 @@ Effect com_lateral() {
 Effect slope() {
   return {.name = "slope",
           .sentence = "The ground slopes.",
-          .family = "constant_force",
           .parameters = {{"g_x", "m/s²", 0}, {"g_y", "m/s²", 0}},
           .excite = "drive slowly in all directions",
           .measured_by = DirectMeasurement::turned_round,
@@ -134,7 +134,7 @@ Effect wheel_out_of_round() {
                   const auto angle = drive.joints[j].angle.array();
                   for (const Signal& wave : {Signal(angle.cos()), Signal(angle.sin())}) {
                     columns.push_back(at_joints(drive, only(drive, j, wave)));
-                    columns.push_back(larger_wheel(drive, j, wave / drive.wheel_radius));
+                    columns.push_back(larger_wheel(drive, j, wave / drive.wheel_radius, 0.0));
                   }
                 }
                 return columns;
@@ -189,13 +189,14 @@ Effect wheel_radius() {
           .sentence = "Both wheels are larger or smaller than designed.",
           .parametric = true,
           .parameters = {{"epsilon", "1", 0}, armature_change()},
+          .shapes = {friction_on_body()},
           .excite = "drive straight with the pose logged",
           .measured_by = DirectMeasurement::lengths,
           .applies = needs_two_wheels,
-          .columns = [](const Drive& drive, Shape) {
+          .columns = [](const Drive& drive, Shape shape) {
             const Signal one = Signal::Ones(drive.rows());
-            Column column = larger_wheel(drive, 0, one);
-            add(column, larger_wheel(drive, 1, one));
+            Column column = larger_wheel(drive, 0, one, shape[0]);
+            add(column, larger_wheel(drive, 1, one, shape[0]));
             return std::vector{column, rate_at_joints(drive, {drive.joints[0].speed, drive.joints[1].speed})};
           }};
 }
@@ -203,8 +204,9 @@ Effect wheel_radius() {
 Effect wheel_radius_asymmetric() {
   return {.name = "wheel_radius_asymmetric",
           .sentence = "One wheel is larger or smaller than the other.",
+          .family = "rolling_distance",
           .parameters = {{"epsilon", "1", 0}, armature_change()},
-          .shapes = {side_or_opposite()},
+          .shapes = {side_or_opposite(), friction_on_body()},
           .excite = "drive straight with the pose logged",
           .measured_by = DirectMeasurement::lengths,
           .applies = needs_two_wheels,
@@ -214,7 +216,7 @@ Effect wheel_radius_asymmetric() {
             Column larger;
             for (std::size_t j = 0; j < growth.size(); ++j) {
               if (growth[j].size() > 0) {
-                add(larger, larger_wheel(drive, j, growth[j]));
+                add(larger, larger_wheel(drive, j, growth[j], shape[1]));
               }
             }
             return std::vector{larger,
@@ -222,19 +224,21 @@ Effect wheel_radius_asymmetric() {
           }};
 }
 
+// The joint itself turns faster, and its friction and inertia with it: the base model at the true speeds is exact,
+// wherever its friction and inertia are.
 Effect encoder_scale() {
   return {.name = "encoder_scale",
           .sentence = "One wheel's encoder has another scale than the robot file says.",
+          .family = "rolling_distance",
           .parametric = true,
-          .parameters = {{"epsilon", "1", 0}, armature_change()},
+          .parameters = {{"epsilon", "1", 0}},
           .shapes = {side()},
           .excite = "drive straight with the pose logged",
           .measured_by = DirectMeasurement::lengths,
           .applies = needs_two_wheels,
           .columns = [](const Drive& drive, Shape shape) {
             const std::size_t j = chosen(shape);
-            return std::vector{unseen_rim_speed(drive, j, rim_speed(drive, j), true),
-                               rate_at_joints(drive, only(drive, j, drive.joints[j].speed))};
+            return std::vector{unseen_rim_speed(drive, j, rim_speed(drive, j), 1.0)};
           }};
 }
 
@@ -245,13 +249,14 @@ Effect track_width() {
       .sentence = "The wheels stand further apart or closer together than designed.",
       .parametric = true,
       .parameters = {{"narrowing", "1", 0}, {"inertia_change", "1", 0, true}},
+      .shapes = {friction_on_body()},
       .excite = "turn on the spot, both ways, with the heading logged",
       .measured_by = DirectMeasurement::lengths,
       .applies = needs_two_wheels,
       .columns =
-          [](const Drive& drive, Shape) {
-            Column column = unseen_motion(drive, {{}, -drive.coordinates[1].smooth_speed}, false);
-            const std::vector<Signal> effort = inertial_efforts(drive);
+          [](const Drive& drive, Shape shape) {
+            Column column = unseen_motion(drive, {{}, -drive.coordinates[1].smooth_speed}, shape[0]);
+            const std::vector<Signal> effort = inertial_efforts(drive, shape[0]);
             Column lever;
             lever.effort = {{}, -drive.lever_arm * (effort[0] - effort[1])};
             add(column, lever);
@@ -308,7 +313,7 @@ Effect turning_slip() {
           [](const Drive& drive, Shape) {
             Column inertia;
             inertia.effort_rate = {{}, drive.wheel_radius * drive.physical("yaw_inertia") * drive.coordinates[1].speed};
-            return std::vector{unseen_motion(drive, {{}, -drive.coordinates[1].smooth_speed}, false), inertia};
+            return std::vector{unseen_motion(drive, {{}, -drive.coordinates[1].smooth_speed}, 0.0), inertia};
           },
       .physical =
           [](std::span<const double> c, Shape) {
@@ -366,7 +371,7 @@ Effect longitudinal_slip() {
               const Signal share = shape[1] * (rim.array().sign() * force / (shape[0] * shape[1])).tanh();
               return -rim.array() * share.array() / (1.0 + share.array());
             };
-            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
+            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), 0.0)};
           }};
 }
 
@@ -412,7 +417,7 @@ Effect slip_by_force(bool share) {
         const Eigen::ArrayXd slip = -force.sign() * part;
         return share ? Signal(slip * rim_speed(drive, j).array().abs()) : Signal(slip);
       };
-      columns.push_back(unseen_rim_speeds(drive, lost(0), lost(1), false));
+      columns.push_back(unseen_rim_speeds(drive, lost(0), lost(1), 0.0));
     }
     return columns;
   };
@@ -444,7 +449,7 @@ Effect slip_at_the_limit() {
               const Signal rim = rim_speed(drive, j);
               return followed(drive, rim, shape[0]) - rim;
             };
-            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), false)};
+            return std::vector{unseen_rim_speeds(drive, lost(0), lost(1), 0.0)};
           }};
 }
 

@@ -170,17 +170,26 @@ std::vector<Eigen::VectorXd> only(const Drive& drive, std::size_t joint, Eigen::
   return signals;
 }
 
-Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, bool friction) {
+namespace {
+
+// The share of a term's effort that follows unseen motion: all of an inertia's, `friction` of a viscous one's.
+double share_of(const Term& term, double friction) {
+  return term.kind == Term::Kind::acceleration ? 1.0 : term.kind == Term::Kind::speed ? friction : 0.0;
+}
+
+}  // namespace
+
+Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, double friction) {
   Column column;
   column.effort.resize(drive.model.n());
   column.effort_rate.resize(drive.model.n());
   for (const Term& term : drive.model.terms) {
-    if (term.kind == Term::Kind::function || (term.kind == Term::Kind::speed && !friction)) {
-      continue;
+    const double share = share_of(term, friction);
+    if (share > 0.0) {
+      auto& group = term.kind == Term::Kind::acceleration ? column.effort_rate : column.effort;
+      const double factor = share * drive.theta[static_cast<Eigen::Index>(term.parameter)] * term.scale;
+      add_to(group[term.output], factor, speed[term.coordinate]);
     }
-    auto& group = term.kind == Term::Kind::acceleration ? column.effort_rate : column.effort;
-    const double factor = drive.theta[static_cast<Eigen::Index>(term.parameter)] * term.scale;
-    add_to(group[term.output], factor, speed[term.coordinate]);
   }
   if (drive.two_wheels()) {
     column.forward = speed[0];
@@ -189,7 +198,8 @@ Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& spe
   return column;
 }
 
-Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const Eigen::VectorXd& left, bool friction) {
+Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const Eigen::VectorXd& left,
+                         double friction) {
   Eigen::VectorXd forward, yaw;
   add_to(forward, 0.5, right);
   add_to(forward, 0.5, left);
@@ -198,14 +208,16 @@ Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const
   return unseen_motion(drive, {forward, yaw}, friction);
 }
 
-std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive) {
+std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive, double friction) {
   const auto n = static_cast<Eigen::Index>(drive.model.n());
   Eigen::MatrixXd outputs = Eigen::MatrixXd::Zero(drive.rows(), n);
   for (const Term& term : drive.model.terms) {
-    if (term.kind == Term::Kind::acceleration) {
-      outputs.col(static_cast<Eigen::Index>(term.output)) += drive.theta[static_cast<Eigen::Index>(term.parameter)] *
-                                                             term.scale *
-                                                             drive.coordinates[term.coordinate].smooth_acceleration;
+    const double share = share_of(term, friction);
+    if (share > 0.0) {
+      const CoordinateSignals& moves = drive.coordinates[term.coordinate];
+      outputs.col(static_cast<Eigen::Index>(term.output)) +=
+          share * drive.theta[static_cast<Eigen::Index>(term.parameter)] * term.scale *
+          (term.kind == Term::Kind::acceleration ? moves.smooth_acceleration : moves.smooth_speed);
     }
   }
   const Eigen::MatrixXd inverse = core::inverse(drive.model.input);
@@ -245,6 +257,21 @@ ShapeParameter side() {
 
 ShapeParameter side_or_opposite() {
   return {.name = "right0_left1_opposite2", .unit = "1", .lower = 0.0, .upper = 2.0, .scan = 3, .discrete = true};
+}
+
+ShapeParameter friction_on_body() {
+  return {
+      .name = "friction_on_body", .unit = "1", .lower = 0.0, .upper = 1.0, .scan = 3, .discrete = true, .beside = true};
+}
+
+double friction_on_body(const Effect& effect, std::span<const double> shape) {
+  const std::string name = friction_on_body().name;
+  for (std::size_t s = 0; s < std::min(effect.shapes.size(), shape.size()); ++s) {
+    if (effect.shapes[s].name == name) {
+      return shape[s];
+    }
+  }
+  return 1.0;
 }
 
 Eigen::Vector2d side_factors(std::span<const double> shape) {
@@ -306,6 +333,23 @@ std::vector<Effect> effect_catalogue(const Model& model) { return catalogue_of(m
 const Effect* find_effect(const std::vector<Effect>& catalogue, std::string_view name) {
   const auto found = std::ranges::find(catalogue, name, &Effect::name);
   return found == catalogue.end() ? nullptr : &*found;
+}
+
+std::span<const EffectFamily> effect_families() {
+  static constexpr std::array<EffectFamily, 2> kFamilies{{
+      {"late_torque", "torque that comes late (lag, delay or clock)",
+       "steps of the torque tell them apart, which a delay moves and a lag rounds, or the motor's current on the clock "
+       "of the encoders; a clock's offset shows in the pose, too"},
+      {"rolling_distance", "the rolling distance per count of one wheel (its radius or its encoder)",
+       "a larger wheel asks for more torque for the same force, another scale of its encoder does not; or measure the "
+       "wheel's circumference and a turn of its encoder by hand"},
+  }};
+  return kFamilies;
+}
+
+const EffectFamily* find_family(std::string_view name) {
+  const auto found = std::ranges::find(effect_families(), name, &EffectFamily::name);
+  return found == effect_families().end() ? nullptr : &*found;
 }
 
 std::string catalogue_noun(std::string_view name) {

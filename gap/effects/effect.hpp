@@ -36,6 +36,8 @@ struct ShapeParameter {
   bool both_signs = false;   ///< |value| is between the bounds, its sign either
   double resolution = 0.0;   ///< of a time: steps of the log below which stamps and holds of its makers are not known
   bool discrete = false;     ///< the grid's points are all values there are (a side, a kind): nothing lies between
+  bool beside = false;  ///< of what surrounds the effect and not of itself (where the robot's friction is): neither
+                        ///< reported nor counted as a number of its own
   std::function<double(const Drive&)> scale{};  ///< of this drive, > 0, e.g. a typical speed; empty: 1
 };
 
@@ -78,6 +80,20 @@ enum class DirectMeasurement {
   none,
 };
 
+/// Effects that are one answer: what is wrong and its size are the same whichever of them it is. They are the laws by
+/// which that acts, and are listed with the answer.
+struct EffectFamily {
+  std::string_view name;   ///< as Effect::family and results have it
+  std::string_view noun;   ///< of the answer in sentences, with its laws
+  std::string_view apart;  ///< what tells the laws apart
+};
+
+/// The families of the catalogue. Effects of a user's own may have others.
+[[nodiscard]] std::span<const EffectFamily> effect_families();
+
+/// The family of that name, or null.
+[[nodiscard]] const EffectFamily* find_family(std::string_view name);
+
 /// One unmodelled effect, or one parametric cause. An effect that follows one of several laws, which have other columns
 /// (friction that bends before it slides; slip as a speed or as a share of one), is several of the same name: at most
 /// one of them is in a set of causes.
@@ -85,7 +101,7 @@ struct Effect {
   std::string name{};                     ///< as in results
   std::string noun{};                     ///< as sentences call it; empty: as catalogue_noun(name)
   std::string sentence{};                 ///< description for people
-  std::string family{};                   ///< name shared by effects that are the same cause; empty: none
+  std::string family{};                   ///< of effects that are told as one answer (EffectFamily); empty: none
   std::vector<std::string> steady{};      ///< causes that it is when nothing changes in time: no rival of them
   std::string common{};                   ///< parametric cause that is a part of this effect: unequal gains have a
                                           ///< mean. Where both are found it is one cause; empty: none
@@ -175,17 +191,18 @@ template <typename Function>
 [[nodiscard]] std::vector<Eigen::VectorXd> only(const Drive& drive, std::size_t joint, Eigen::VectorXd signal);
 
 /// The column of a robot whose coordinates move faster than its joints show, by `speed` (one signal per coordinate,
-/// empty for zeros): the base model's effort for that motion; for a robot on wheels also its body velocity. Without
-/// `friction` only its inertia: friction in the joints knows nothing of what they do not show. Terms of the base model
-/// that are functions of the motion are taken as they are.
-[[nodiscard]] Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, bool friction);
+/// empty for zeros): the base model's effort for that motion; for a robot on wheels also its body velocity. Of its
+/// viscous friction the share `friction`, 0 to 1: friction in the joints knows nothing of what they do not show. Terms of
+/// the base model that are functions of the motion are taken as they are.
+[[nodiscard]] Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, double friction);
 
 /// The same for wheels whose rims move faster by `right` and `left`, m/s.
 [[nodiscard]] Column unseen_rim_speeds(const Drive& drive, const Eigen::VectorXd& right, const Eigen::VectorXd& left,
-                                       bool friction);
+                                       double friction);
 
-/// The joints' efforts of the base model's inertial terms on the smooth motion.
-[[nodiscard]] std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive);
+/// The joints' efforts of the base model's inertial terms on the smooth motion, and of the share `friction` of its
+/// viscous ones.
+[[nodiscard]] std::vector<Eigen::VectorXd> inertial_efforts(const Drive& drive, double friction = 0.0);
 
 /// Base regressor column of the parameter with the physical name `name`, per physical unit; zeros where the model has
 /// none of this name. Terms that are functions of the motion are left out.
@@ -200,7 +217,14 @@ void add(Column& a, const Column& b);
 /// The shape of an effect of one wheel (0 right, 1 left) or of both with opposite signs (2).
 [[nodiscard]] ShapeParameter side_or_opposite();
 
-/// The factors of that shape, the first of `shape` (0 where there is none), at the right and the left wheel.
+/// The shape that says which share of viscous friction acts on the body, by 1 (as the paper's model has it), one half or
+/// 0 (all of it in the joints): lengths of the robot act on the torque by it, and a robot file does not say it.
+[[nodiscard]] ShapeParameter friction_on_body();
+
+/// The value of that shape in `shape` of `effect`; 1 for an effect without it.
+[[nodiscard]] double friction_on_body(const Effect& effect, std::span<const double> shape);
+
+/// The factors of the shape of one wheel or both, the first of `shape` (0 where there is none), at the right and the left wheel.
 [[nodiscard]] Eigen::Vector2d side_factors(std::span<const double> shape);
 
 /// The signals of that shape: `right`, `left` or [right, −left]; empty where a wheel has none.

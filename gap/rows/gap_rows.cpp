@@ -483,6 +483,7 @@ CandidateTable add_catalogue(GapRows& rows, const Drive& drive, const std::vecto
     candidate.effect = task.effect;
     candidate.shape = std::move(task.shape);
     candidate.unit_coefficient = effect.unit_coefficient;
+    candidate.beside = static_cast<std::size_t>(std::ranges::count(effect.shapes, true, &ShapeParameter::beside));
     for (std::size_t c = 0; c < task.parts.size(); ++c) {
       candidate.columns.push_back(add_column(rows.spaces, std::move(task.parts[c])));
       candidate.sign.push_back(c < effect.parameters.size() ? effect.parameters[c].sign : 0);

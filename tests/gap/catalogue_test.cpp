@@ -32,6 +32,7 @@ double wheel(int j, double t) {
 // What differs from the base model; everything else follows.
 struct World {
   double radius_r = kR, radius_l = kR, track = kD;
+  double friction_on_body = 0.0;  // share of the viscous friction; in the joints the rest
   std::function<double(double t, double v1, double v2, double heading)> force = [](auto...) { return 0.0; };
   std::function<double(double t, double v1, double v2, double a1, double a2)> moment = [](auto...) { return 0.0; };
   std::function<double(double t, double v1, double v2, double a1, double a2)> inertial_force = [](auto...) {
@@ -55,11 +56,13 @@ Instant instant(const World& world, double t, double heading) {
     return (world.radius_r * wheel(0, s) - world.radius_l * wheel(1, s)) / world.track;
   };
   const double v1 = v1_at(t), v2 = v2_at(t), a1 = derivative(v1_at, t), a2 = derivative(v2_at, t);
-  const double force = kM * a1 + world.force(t, v1, v2, heading) + world.inertial_force(t, v1, v2, a1, a2);
-  const double moment = kI * a2 + world.moment(t, v1, v2, a1, a2);
-  // Friction is in the joints: it goes with their speeds.
-  const double drag = 0.25 * kR * kR * kF1 * (wheel(0, t) + wheel(1, t));
-  const double turn = kR * kR * kF3 * (wheel(0, t) - wheel(1, t)) / (kD * kD);
+  const double body = world.friction_on_body, joints = 1.0 - body;
+  const double force =
+      kM * a1 + body * kF1 * v1 + world.force(t, v1, v2, heading) + world.inertial_force(t, v1, v2, a1, a2);
+  const double moment = kI * a2 + body * kF3 * v2 + world.moment(t, v1, v2, a1, a2);
+  // Friction in the joints goes with their speeds.
+  const double drag = joints * 0.25 * kR * kR * kF1 * (wheel(0, t) + wheel(1, t));
+  const double turn = joints * kR * kR * kF3 * (wheel(0, t) - wheel(1, t)) / (kD * kD);
   const double right = world.radius_r * (0.5 * force + moment / world.track) + drag + turn;
   const double left = world.radius_l * (0.5 * force - moment / world.track) + drag - turn;
   const auto turned = [&](int j) { return derivative([j](double s) { return wheel(j, s); }, t); };
@@ -293,17 +296,20 @@ TEST(Catalogue, LagIsExplainedByItsColumn) {
   expect_explained({"actuator_lag", drive, {T}, {}, 0.01});
 }
 
-TEST(Catalogue, GeometryIsExplainedInTorqueAndPose) {
-  World large;
-  large.radius_r = 1.01 * kR;
-  expect_explained({"wheel_radius_asymmetric", drive_of(large), {0.0}, {0.01, 0.0}, 0.03});
-  World both;
-  both.radius_r = both.radius_l = 0.98 * kR;
-  expect_explained({"wheel_radius", drive_of(both), {}, {-0.02, 0.0}, 0.03});
-  World wide;
-  wide.track = 1.02 * kD;
-  expect_explained({"track_width", drive_of(wide), {}, {0.02 / 1.02, 0.0}, 0.04});
-  expect_explained({"encoder_scale", drive_of({}, 0.0, 0.0, 1.02), {0.0}, {0.02, 0.0}, 0.04});
+TEST(Catalogue, GeometryIsExplainedInTorqueAndPoseWhereverTheFrictionIs) {
+  for (const double body : {0.0, 0.5, 1.0}) {
+    SCOPED_TRACE(body);
+    World large{.friction_on_body = body};
+    large.radius_r = 1.01 * kR;
+    expect_explained({"wheel_radius_asymmetric", drive_of(large), {0.0, body}, {0.01, 0.0}, 0.03});
+    World both{.friction_on_body = body};
+    both.radius_r = both.radius_l = 0.98 * kR;
+    expect_explained({"wheel_radius", drive_of(both), {body}, {-0.02, 0.0}, 0.03});
+    World wide{.friction_on_body = body};
+    wide.track = 1.02 * kD;
+    expect_explained({"track_width", drive_of(wide), {body}, {0.02 / 1.02, 0.0}, 0.04});
+    expect_explained({"encoder_scale", drive_of({.friction_on_body = body}, 0.0, 0.0, 1.02), {0.0}, {0.02}, 0.04});
+  }
 }
 
 TEST(Catalogue, EveryEffectGivesAsManyColumnsAsParametersOnItsWholeGrid) {

@@ -91,9 +91,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"lateral_scrub", {{"mu", 0.08}}, {0.01}, 0.08},
                     Case{"wheel_out_of_round", {{"A_R", 0.1}, {"B_R", -0.05}, {"A_L", 0.03}, {"B_L", 0.08}}, {}, 0.05},
                     Case{"longitudinal_slip", {{"stiffness", 2000.0}}, {2000.0, 0.2}, 0.06},
-                    Case{"wheel_radius_asymmetric", {{"", 0.01 / 1.01}}, {0.0}, 0.0, 0.01},
-                    Case{"wheel_radius_asymmetric", {{"", -0.01 / 1.01}}, {1.0}, 0.0, 0.01},
-                    Case{"wheel_radius_asymmetric", {{"", 0.01}}, {2.0}},
+                    Case{"wheel_radius_asymmetric", {{"", 0.01 / 1.01}}, {0.0, 1.0}, 0.0, 0.01},
+                    Case{"wheel_radius_asymmetric", {{"", -0.01 / 1.01}}, {1.0, 1.0}, 0.0, 0.01},
+                    Case{"wheel_radius_asymmetric", {{"", 0.01}}, {2.0, 1.0}},
                     Case{"encoder_scale", {{"s_R", 0.0}, {"s_L", -0.03}}, {1.0}}),
     [](const auto& test) { return test.param.name + "_" + std::to_string(test.index); });
 
@@ -112,21 +112,29 @@ TEST(ImprovedRobot, AGainAtOneSideBecomesACommonAndAnAntisymmetricOne) {
 }
 
 TEST(ImprovedRobot, OneLargerWheelIsThatWheelOnly) {
-  const Robot right = improved({fitted("wheel_radius_asymmetric", {0.05, 0.0}, {0.0})});
+  const Robot right = improved({fitted("wheel_radius_asymmetric", {0.05, 0.0}, {0.0, 0.0})});
   const model::DriveGeometry geometry = model::drive_geometry(right);
   EXPECT_NEAR(geometry.radius[0], 0.0975 * 1.05, 1e-12);
   EXPECT_NEAR(geometry.radius[1], 0.0975, 1e-12);
   // b = r² f1/2 at each joint, through unequal radii: the cross term of Σ b ω_j/r_j to first order.
   EXPECT_NEAR(effect_value(right, "viscous_asymmetric", "b"), -0.0975 * 0.0975 * 4.0 * 0.05, 0.06 * 0.0019);
   // J at the right joint asks for J/r² (D/2) v̇1 about the yaw axis: as −m b v̇1 does.
-  const Robot geared = improved({fitted("wheel_radius_asymmetric", {0.0, 0.002}, {0.0})});
+  const Robot geared = improved({fitted("wheel_radius_asymmetric", {0.0, 0.002}, {0.0, 0.0})});
   EXPECT_NEAR(-geared.nominal.at("mass") * effect_value(geared, "com_lateral", "b"), 0.002 / (0.0975 * 0.0975) * 0.1905,
               1e-9);
   EXPECT_NEAR(geared.nominal.at("mass"), 21.0 + 0.002 / (0.0975 * 0.0975), 1e-9);
-  const Robot both = improved({fitted("wheel_radius", {0.05, 0.0})});
+  // Friction on the body is what it was, and none of the joints is to be kept.
+  const Robot of_body = improved({fitted("wheel_radius_asymmetric", {0.05, 0.0}, {0.0, 1.0})});
+  ASSERT_EQ(of_body.effects.size(), 1U);
+  EXPECT_NEAR(of_body.nominal.at("viscous_linear"), 4.0, 1e-9);
+  EXPECT_NEAR(improved({fitted("track_width", {-0.1, 0.0}, {1.0})}).nominal.at("viscous_yaw"),
+              gap_example::kYawFriction, 1e-9);
+  EXPECT_NEAR(improved({fitted("track_width", {-0.1, 0.0}, {0.0})}).nominal.at("viscous_yaw"),
+              0.81 * gap_example::kYawFriction, 1e-9);
+  const Robot both = improved({fitted("wheel_radius", {0.05, 0.0}, {0.0})});
   EXPECT_NEAR(both.wheel_radius, 0.0975 * 1.05, 1e-12);
   EXPECT_TRUE(both.effects.empty());
-  EXPECT_NEAR(improved({fitted("track_width", {-0.1, 0.0})}).track_width, 0.9 * 0.381, 1e-12);
+  EXPECT_NEAR(improved({fitted("track_width", {-0.1, 0.0}, {0.0})}).track_width, 0.9 * 0.381, 1e-12);
 }
 
 TEST(ImprovedRobot, ParametricCausesAreNominalValues) {
