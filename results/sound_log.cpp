@@ -2,7 +2,9 @@
 #include "results/sound_log.hpp"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -13,6 +15,18 @@
 #include "results/health_json.hpp"
 
 namespace wheelwright::results {
+namespace {
+
+// Whether what is found in spite of this finding may be wrong: then every command says it.
+bool doubts_result(const doctor::LogFinding& finding) {
+  constexpr std::array<std::string_view, 7> ids = {"signals.wheels_disagree", "signals.saturation", "signals.stuck",
+                                                   "signals.rounded",         "signals.stale",      "time.gyro_delay",
+                                                   "time.pose_delay"};
+  return finding.severity == doctor::FindingSeverity::warning && !finding.hides && !finding.speed_cut &&
+         (finding.topic == doctor::FindingTopic::units || std::ranges::count(ids, finding.id) > 0);
+}
+
+}  // namespace
 
 SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const Robot& robot, logs::LogOptions reader,
                         const std::vector<std::string>& despite, WheelPose pose, std::size_t threads) {
@@ -28,8 +42,7 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
   std::vector<std::string> names;
   for (const doctor::LogFinding& finding : health.findings) {
     if (!finding.is_refusal()) {
-      // A wrong scale of the efforts is one of all that is found.
-      if (finding.id == "units.effort" || finding.id == "signals.wheels_disagree") {
+      if (doubts_result(finding)) {
         out.remarks.push_back(fmt::format("{}: {} {}", finding.id, finding.sentence, finding.next));
       }
       continue;

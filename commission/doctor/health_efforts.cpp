@@ -20,7 +20,7 @@
 namespace wheelwright::doctor {
 namespace {
 
-constexpr double kLeastFrozen = 0.75;  // s, of a stretch that is looked at
+constexpr double kLeastFrozen = 0.3;  // s, of a stretch that is looked at
 constexpr std::size_t kLeastFrozenRows = 6;
 constexpr double kTimesUsual = 5.0;         // as many rows as a value usually lasts
 constexpr std::size_t kFewestChanges = 20;  // elsewhere, that show how long a value usually lasts
@@ -265,10 +265,7 @@ LogFinding of_frozen(const HealthView& view, const std::vector<Frozen>& frozen, 
       "Efforts stand still for {:.3g} s in {} stretch{} while the robot moves as they cannot move "
       "it: {}{}.",
       seconds, f.stretches, f.stretches == 1 ? "" : "es", core::listed(values), why);
-  std::string options;
-  for (const Interval& stretch : f.when) {
-    options += " " + as_argument(stretch);
-  }
+  const std::string options = without_arguments(f);
   f.next = fmt::format(
       "Find out why the efforts stopped (a driver that was switched off, a message that was not sent "
       "anew), and leave these stretches out: `wheelwright convert LOG rest.csv{}`{}, then use "
@@ -278,6 +275,14 @@ LogFinding of_frozen(const HealthView& view, const std::vector<Frozen>& frozen, 
 }
 
 }  // namespace
+
+std::string without_arguments(const LogFinding& finding) {
+  std::string options;
+  for (const Interval& stretch : finding.when) {
+    options += " " + as_argument(stretch);
+  }
+  return options;
+}
 
 std::vector<ValueRun> value_runs(const HealthView& view, const std::vector<double>& column) {
   std::vector<ValueRun> runs;

@@ -22,10 +22,13 @@ struct ValueRun {
 /// `column` of the log in `view` as runs of equal values, in the order of its rows.
 [[nodiscard]] std::vector<ValueRun> value_runs(const HealthView& view, const std::vector<double>& column);
 
+/// The stretches of `finding` as arguments of `convert`: " --without 60:61.98 …".
+[[nodiscard]] std::string without_arguments(const LogFinding& finding);
+
 /// True if the robot moves in at least half of the rows of `run`.
 [[nodiscard]] bool mostly_moves(const HealthView& view, const ValueRun& run);
 
-/// Finds stretches of 0.75 s and more in which an effort keeps one value to all digits, although it is new every few
+/// Finds stretches of 0.3 s and more in which an effort keeps one value to all digits, although it is new every few
 /// rows elsewhere, and in which the robot moves as no such effort explains: signals.effort_frozen. What explains motion
 /// is the model with all its parameters, fitted to the rest of the log; a stretch is frozen where the mean square of
 /// its residual is four times that of the worst stretch of its length in the rest, and material beside the efforts.

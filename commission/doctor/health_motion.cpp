@@ -29,6 +29,10 @@ constexpr double kOddTimesNominal = 3.0;    // either way: worth a word
 constexpr double kMostTimesNominal = 8.0;   // robots that carry goods carry up to seven times their own mass
 constexpr double kLeastTimesNominal = 0.2;  // and lose less
 constexpr double kOneFactor = 1.25;         // between ratios of mass, inertia and friction that are one factor
+constexpr double kSameFactor = 1.1;         // likewise, where the factor itself is below kOddTimesNominal
+constexpr double kNamedFactor = 1.35;       // least factor of those
+constexpr double kDensest = 1.2e5;          // kg/m³ of the radius of gyration, cubed: a cube of steel
+constexpr double kFollowsMotion = 0.3;      // correlation of an effort, less its mean, with what drives it
 constexpr double kUnusedRisk = 1e-3;        // for fit_log; not used further
 
 LogFinding about_motion(const char* id, FindingSeverity severity, std::string sentence, std::string next, double value,
@@ -127,6 +131,36 @@ bool is_inner(const HealthView& view, const JointView& joint, std::size_t k) {
   });
 }
 
+// The value about which an effort that is never negative follows the motion, as a command does whose zero is in the
+// middle of its range; nothing where only its size was logged.
+std::optional<double> middle_of_effort(const HealthView& view, const JointView& joint) {
+  constexpr std::size_t kSpan = 5;
+  const std::vector<double>& t = view.log->t;
+  Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+  double ee = 0.0, e1 = 0.0, n = 0.0;
+  for (const auto& [first, last] : view.segments) {
+    for (std::size_t k = first + kSpan; k + kSpan < last; ++k) {
+      const double e = (*joint.effort)[k],
+                   a = (joint.smooth[k + kSpan] - joint.smooth[k - kSpan]) / (t[k + kSpan] - t[k - kSpan]);
+      const Eigen::Vector3d row(1.0, joint.smooth[k], a);
+      gram += row * row.transpose();
+      moment += e * row;
+      ee += e * e;
+      e1 += e;
+      n += 1.0;
+    }
+  }
+  const double varies = n > 0.0 ? ee - e1 * e1 / n : 0.0;
+  if (!(varies > 0.0) || !(gram.determinant() > 0.0)) {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d c = gram.inverse() * moment;
+  const double explained = (c.dot(moment) - e1 * e1 / n) / varies;
+  const double spread = std::sqrt(varies / n);
+  return explained > kFollowsMotion && c[0] > 2.0 * spread ? std::optional(c[0]) : std::nullopt;
+}
+
 // Whether every joint has, in motion, efforts of both signs or speeds of one.
 void check_effort_sense(const HealthView& view, std::vector<LogFinding>& out) {
   for (const JointView& j : view.joints) {
@@ -147,6 +181,24 @@ void check_effort_sense(const HealthView& view, std::vector<LogFinding>& out) {
       }
     }
     if (!(ee > 0.0)) {
+      continue;
+    }
+    if (const auto middle =
+            view.one_sided(j) && !view.robot.effort_unsigned ? middle_of_effort(view, j) : std::nullopt) {
+      out.push_back({.id = "units.effort_offset",
+                     .topic = FindingTopic::units,
+                     .severity = FindingSeverity::fatal,
+                     .sentence = fmt::format(
+                         "{0} is never negative although its wheel turns both ways, and follows the motion about "
+                         "{1:.4g}: its zero is there, as that of a command of 8 bits is.",
+                         j.effort_name, *middle),
+                     .next = fmt::format(
+                         "Take its zero off, e.g. by `wheelwright convert LOG a.csv`, then `awk -F, -v OFS=, "
+                         "'NR==1{{for(i=1;i<=NF;i++)c[$i]=i}} NR>1{{$c[\"{0}\"]-={1:.4g}}} 1' a.csv > b.csv` (and the "
+                         "same of the other wheel), and use b.csv.",
+                         j.effort_name, *middle),
+                     .columns = {j.effort_name},
+                     .value = *middle});
       continue;
     }
     if (view.one_sided(j) && (!view.robot.effort_unsigned || !view.robot_given)) {
@@ -170,7 +222,9 @@ void check_effort_sense(const HealthView& view, std::vector<LogFinding>& out) {
                      .sentence = fmt::format("{} and {} have opposite signs: the effort would brake the wheel that it "
                                              "drives (correlation with speed {:.2f}, with acceleration {:.2f}).",
                                              j.effort_name, j.motion_name(), power, inertia),
-                     .next = "Turn the sign of one of them: both count positive when the wheel drives forwards.",
+                     .next = fmt::format("Turn the sign of one of them, for both count positive when the wheel drives "
+                                         "forwards: of the effort {}.",
+                                         scaling_arguments(view, {j.effort_name}, -1.0)),
                      .columns = {j.effort_name, j.motion_name()},
                      .value = power,
                      .unit = "1"});
@@ -212,7 +266,10 @@ void check_traction(const HealthView& view, std::vector<LogFinding>& out) {
            .sentence = fmt::format("By {} and the robot file's radius the rim accelerates at {:.3g} m/s², which "
                                    "no tyre holds (at {:.3g} m/s): degrees or rpm?",
                                    j.motion_name(), high, view.robot.wheel_radius * j.top),
-           .next = "Convert the wheels' motion to rad and rad/s at the wheel, or correct wheel_radius.",
+           .next = fmt::format("Convert the wheels' motion to rad and rad/s at the wheel, or correct wheel_radius: of "
+                               "degrees {} does so, of rpm {}.",
+                               scaling_arguments(view, motion_columns(view), std::numbers::pi / 180.0),
+                               scaling_arguments(view, motion_columns(view), std::numbers::pi / 30.0)),
            .columns = {j.motion_name()},
            .value = high,
            .unit = "m/s²"});
@@ -297,10 +354,10 @@ std::vector<NominalRatio> nominal_ratios(const commission::Setting& s, const com
 }
 
 // Whether mass, inertia and friction are off by one and the same factor, as a load does not change them.
-bool by_one_factor(const std::vector<NominalRatio>& ratios, double factor) {
+bool by_one_factor(const std::vector<NominalRatio>& ratios, double factor, double spread) {
   std::size_t frictions = 0;
   for (const NominalRatio& r : ratios) {
-    if (!(r.ratio() > factor / kOneFactor && r.ratio() < factor * kOneFactor)) {
+    if (!(r.ratio() > factor / spread && r.ratio() < factor * spread)) {
       return false;
     }
     frictions += r.is_friction ? 1 : 0;
@@ -353,15 +410,15 @@ EffortUnit unit_of_efforts(const Robot& robot, double ratio, double top) {
 std::string convert_efforts(const HealthView& view, double ratio, const EffortUnit& unit) {
   const bool known = unit.factor > 0.0;
   const double factor = known ? unit.factor : 1.0 / ratio;
-  std::vector<std::string> maps;
+  std::vector<std::string> efforts;
   for (const JointView& j : view.joints) {
-    maps.push_back(fmt::format("--map {}=\"COLUMN*{:.4g}\"", j.effort_name, factor));
+    efforts.push_back(j.effort_name);
   }
   return fmt::format(
-      "Say what one unit of the efforts is{}: `{}` (or the same under `columns:` in the robot file), with COLUMN as "
-      "the "
-      "log calls it{}. Or correct effort.kind, wheel_radius or nominal in the robot file.",
-      view.robot.effort == model::EffortKind::torque ? " in N·m at the wheel" : "", core::listed(maps, " "),
+      "Say what one unit of the efforts is{}: {} (or the same under `columns:` in the robot file){}. Or correct "
+      "effort.kind, wheel_radius or nominal in the robot file.",
+      view.robot.effort == model::EffortKind::torque ? " in N·m at the wheel" : "",
+      scaling_arguments(view, efforts, factor),
       known ? ""
             : fmt::format("; {:.4g} is what makes the mass the nominal one: take the drive's data sheet (rated torque, "
                           "gear, torque constant) for the true factor",
@@ -376,25 +433,35 @@ void check_effort_scale(const HealthView& view, const commission::Setting& s, co
   const std::vector<NominalRatio> ratios = nominal_ratios(s, fit);
   for (const NominalRatio& mass : ratios) {
     const double ratio = mass.ratio();
-    if (!mass.is_mass || !(ratio > 0.0) || (ratio < kOddTimesNominal && ratio > 1.0 / kOddTimesNominal)) {
+    if (!mass.is_mass || !(ratio > 0.0)) {
       continue;
     }
-    const bool one_factor = by_one_factor(ratios, ratio);
+    const bool odd = ratio >= kOddTimesNominal || ratio <= 1.0 / kOddTimesNominal;
+    const bool one_factor = by_one_factor(ratios, ratio, odd ? kOneFactor : kSameFactor);
+    if (!odd && !(one_factor && std::abs(std::log(ratio)) > std::log(kNamedFactor))) {
+      continue;
+    }
     double top = 0.0;
     for (const JointView& j : view.joints) {
       for (const double e : *j.effort) {
         top = std::max(top, std::abs(e));
       }
     }
-    EffortUnit unit = unit_of_efforts(view.robot, ratio, top);
-    bool of_speeds = false;
+    EffortUnit unit = odd ? unit_of_efforts(view.robot, ratio, top) : EffortUnit{};
+    const bool measured = view.column("gyro_z") != nullptr || view.column("theta") != nullptr;
+    double of_speeds = 0.0;  // factor that makes rad/s of the wheels' motion, where that explains the ratio
     for (const TorqueUnit& known : kSpeedUnits) {
       if (std::abs(ratio / known.ratio - 1.0) < 0.3) {
-        of_speeds = true;
+        of_speeds = known.ratio;
         unit.words = fmt::format("the wheels' motion were in {}", known.unit);
       }
     }
-    const bool far = one_factor || ratio > kMostTimesNominal || ratio < kLeastTimesNominal;
+    if (const double r = view.robot.wheel_radius;
+        odd && !measured && model::on_two_wheels(view.robot) && std::abs(ratio * r - 1.0) < 0.05) {
+      of_speeds = 1.0 / r;
+      unit.words = "the wheels' motion were that of the rim, in m and m/s";
+    }
+    const bool far = (odd && one_factor) || ratio > kMostTimesNominal || ratio < kLeastTimesNominal;
     out.push_back(
         {.id = "units.effort",
          .topic = FindingTopic::units,
@@ -404,16 +471,64 @@ void check_effort_scale(const HealthView& view, const commission::Setting& s, co
                                  mass.name, mass.value, mass.nominal, ratio,
                                  one_factor ? ", and the frictions likewise, which no load does" : "",
                                  unit.words.empty() ? ""
-                                 : of_speeds        ? ", as if " + unit.words
+                                 : of_speeds > 0.0  ? ", as if " + unit.words
                                                     : ", as if efforts were " + unit.words),
-         .next = of_speeds
-                     ? "Convert the wheels' motion to rad and rad/s at the wheel, or check the unit of the efforts "
-                       "(N·m at the wheel, A, V), effort.kind, and the wheel radius."
-                     : convert_efforts(view, ratio, unit),
+         .next =
+             of_speeds > 0.0
+                 ? fmt::format("Convert the wheels' motion to rad and rad/s at the wheel ({} does so), or check the "
+                               "unit of the efforts (N·m at the wheel, A, V), effort.kind, and the wheel radius.",
+                               scaling_arguments(view, motion_columns(view), of_speeds))
+                 : convert_efforts(view, ratio, unit),
          .columns = s.measurement.effort_columns,
          .value = ratio,
          .unit = "1"});
   }
+}
+
+// Mass and yaw inertia of a body that is denser than steel: efforts of another unit, where no nominal mass tells.
+void check_density(const HealthView& view, const commission::Setting& s, const commission::Fit& fit,
+                   std::vector<LogFinding>& out) {
+  if (!view.robot_given || view.robot.effort != model::EffortKind::torque || !model::on_two_wheels(view.robot) ||
+      s.robot.nominal.contains("mass")) {
+    return;
+  }
+  double mass = 0.0, inertia = 0.0;
+  const auto scales = commission::physical_scales(s.robot, s.model);
+  for (std::size_t j = 0; scales && j < s.model.p(); ++j) {
+    const std::string& name = s.model.parameters[j].physical;
+    if (fit.excitation[j].state != identify::Excitation::identified) {
+      continue;
+    }
+    const double value = (*scales)[j].scale * fit.estimate[static_cast<Eigen::Index>(j)] - (*scales)[j].offset;
+    mass = name == "mass" ? value : mass;
+    inertia = name == "yaw_inertia" ? value : inertia;
+  }
+  if (!(mass > 0.0 && inertia > 0.0)) {
+    return;
+  }
+  const double gyration = std::sqrt(inertia / mass), density = mass / (gyration * gyration * gyration);
+  if (density < kDensest) {
+    return;
+  }
+  std::vector<std::string> efforts;
+  for (const JointView& j : view.joints) {
+    efforts.push_back(j.effort_name);
+  }
+  out.push_back(
+      {.id = "units.effort",
+       .topic = FindingTopic::units,
+       .severity = FindingSeverity::fatal,
+       .sentence =
+           fmt::format("Efforts read as N·m give a mass of {:.3g} kg with a radius of gyration of {:.2g} m: a lump "
+                       "of steel of that weight is larger.",
+                       mass, gyration),
+       .next = fmt::format("Say what one unit of the efforts is in N·m at the wheel: of mN·m {}, of N·cm {}. For per "
+                           "cent, PWM or A give the robot file a rough `nominal: {{mass: …}}` (kg): then the factor is "
+                           "named that fits it.",
+                           scaling_arguments(view, efforts, 1e-3), scaling_arguments(view, efforts, 1e-2)),
+       .columns = s.measurement.effort_columns,
+       .value = density,
+       .unit = "kg/m³"});
 }
 
 void check_sides(const commission::Setting& s, const commission::Fit& fit, std::vector<LogFinding>& out) {
@@ -557,6 +672,7 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
     const bool excited = check_excitation(view, log, s, fit, findings);
     if (excited) {
       check_effort_scale(view, s, fit, findings);
+      check_density(view, s, fit, findings);
       check_sides(s, fit, findings);
       check_mirrored(view, s, fit, findings);
       check_remainder(s, fit, findings);

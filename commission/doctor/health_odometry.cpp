@@ -15,19 +15,22 @@
 #include "commission/pose_origin.hpp"
 #include "core/error.hpp"
 #include "core/statistics.hpp"
+#include "core/words.hpp"
 #include "identify/inference/kinematic_calibration.hpp"
 
 namespace wheelwright::doctor {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kWindow = 1.0;     // s
-constexpr std::size_t kFewest = 8;  // windows
-constexpr double kNeeded = 0.05;    // of a mean square, that the other one alone leaves
-constexpr double kClear = 4.0;      // standard errors
-constexpr double kFastest = 10.0;   // rad in a window
-constexpr double kAligned = 0.8;    // of displacements with the heading, for a forward direction
-constexpr double kFits = 0.5;       // least share of the variation that wheels must explain of a pose
+constexpr double kWindow = 1.0;        // s
+constexpr std::size_t kFewest = 8;     // windows
+constexpr double kNeeded = 0.05;       // of a mean square, that the other one alone leaves
+constexpr double kClear = 4.0;         // standard errors
+constexpr double kFastest = 10.0;      // rad in a window
+constexpr double kAligned = 0.8;       // of displacements with the heading, for a forward direction
+constexpr double kOddRadius = 0.01;    // of a wheel's radius, from which on another is said
+constexpr double kRadiusErrors = 5.0;  // standard errors, likewise
+constexpr double kFits = 0.5;          // least share of the variation that wheels must explain of a pose
 
 // What happened within a window.
 struct Window {
@@ -251,9 +254,45 @@ std::vector<double> forward_of(const HealthView& view, const std::vector<Window>
   return out;
 }
 
+// Columns of one wheel whose sign is wrong: its motion, and its effort where that drives the wheel as logged.
+std::vector<std::string> mirrored_columns(const HealthView& view, std::size_t side) {
+  const JointView& j = view.joints[side];
+  std::vector<std::string> names = {j.angle_name, j.speed_name};
+  if (j.effort == nullptr) {
+    return names;
+  }
+  double power = 0.0;
+  for (std::size_t k = 0; k < view.log->rows(); ++k) {
+    power += (*j.effort)[k] * j.smooth[k];
+  }
+  if (power > 0.0) {
+    names.push_back(j.effort_name);
+  }
+  return names;
+}
+
+std::vector<std::string> both_mirrored(const HealthView& view) {
+  std::vector<std::string> names = mirrored_columns(view, 0), left = mirrored_columns(view, 1);
+  names.insert(names.end(), left.begin(), left.end());
+  return names;
+}
+
+std::string swapped_words(const HealthView& view) {
+  std::vector<std::string> maps;
+  const JointView &right = view.joints[0], &left = view.joints[1];
+  for (const auto& [one, other] : {std::pair(&right.angle_name, &left.angle_name),
+                                   {&right.speed_name, &left.speed_name},
+                                   {&right.effort_name, &left.effort_name}}) {
+    if (view.column(*one) != nullptr && view.column(*other) != nullptr) {
+      maps.push_back(fmt::format("--map {0}={1} --map {1}={0}", *one, *other));
+    }
+  }
+  return fmt::format("`{}`", fmt::join(maps, " "));
+}
+
 // Signs and sides. `yaw` is that of `column`; nothing where that is not to be had, likewise `forward`.
-void check_sides(const std::optional<WheelFit>& yaw, const std::optional<WheelFit>& forward, const std::string& column,
-                 std::vector<LogFinding>& out) {
+void check_sides(const HealthView& view, const std::optional<WheelFit>& yaw, const std::optional<WheelFit>& forward,
+                 const std::string& column, std::vector<LogFinding>& out) {
   if (!yaw || !(yaw->explained > kFits)) {
     return;
   }
@@ -261,15 +300,13 @@ void check_sides(const std::optional<WheelFit>& yaw, const std::optional<WheelFi
   if (std::abs(along) > 2.0 * std::abs(turn)) {
     const char* side = along > 0.0 ? "left" : "right";
     const char* suffix = along > 0.0 ? "l" : "r";
-    out.push_back(
-        about_units("units.wheel_sign", FindingSeverity::fatal,
-                    fmt::format("{} follows the sum of the wheels, not their difference: the {} wheel counts "
-                                "backwards.",
-                                column, side),
-                    fmt::format("Turn the sign of the {} wheel's speed and angle (and look whether its effort "
-                                "needs it too).",
-                                side),
-                    {fmt::format("omega_{}", suffix), fmt::format("phi_{}", suffix)}, along));
+    out.push_back(about_units("units.wheel_sign", FindingSeverity::fatal,
+                              fmt::format("{} follows the sum of the wheels, not their difference: the {} wheel counts "
+                                          "backwards.",
+                                          column, side),
+                              fmt::format("Turn the sign of the {} wheel: {} does so.", side,
+                                          scaling_arguments(view, mirrored_columns(view, along > 0.0 ? 1 : 0), -1.0)),
+                              {fmt::format("omega_{}", suffix), fmt::format("phi_{}", suffix)}, along));
     return;
   }
   if (turn < 0.0 && std::abs(turn) > 2.0 * std::abs(along)) {
@@ -278,11 +315,19 @@ void check_sides(const std::optional<WheelFit>& yaw, const std::optional<WheelFi
         "units.sides", FindingSeverity::fatal,
         back ? fmt::format("Both wheels count backwards: {} and position go the other way.", column)
              : fmt::format("{} turns the other way than the wheels say.", column),
-        back ? "Turn the signs of both wheels."
-             : fmt::format("Right and left wheel are swapped, or {} counts clockwise: it has to grow in a left turn.",
-                           column),
+        back
+            ? fmt::format("Turn the signs of both wheels: {} does so.",
+                          scaling_arguments(view, both_mirrored(view), -1.0))
+            : fmt::format("Right and left wheel are swapped, or {} counts clockwise: it has to grow in a left turn. {} "
+                          "turns its sign; in a table with these names {} changes the sides.",
+                          column, scaling_arguments(view, {column}, -1.0), swapped_words(view)),
         {column}, turn));
   }
+}
+
+// What makes rad/s of a unit of unit_for_ratio().
+double unit_factor(std::string_view unit) {
+  return unit == "deg/s" ? kDegree : unit == "rpm" ? std::numbers::pi / 30.0 : 2.0 * std::numbers::pi;
 }
 
 // Scales against the robot file's radius r and track D: `lin` and `yaw` are what was found over what they should be.
@@ -294,25 +339,54 @@ void check_scales(const HealthView& view, std::optional<double> lin, std::option
   const bool angles = view.joints[0].angle != nullptr;
   const std::string unit = unit_for_ratio(1.0 / main, true);
   const double gear = view.robot.motor ? view.robot.motor->gear_ratio : 1.0;
+  const std::string measured = view.column("theta") != nullptr ? "the pose says" : "the gyro says";
   if (together && std::abs(std::log(main)) > 1.2) {
+    // Wheels against the gyro alone: one of them is in another unit, and a known one tells which.
+    const std::string of_gyro =
+        lin || view.column("theta") != nullptr || !unit.empty() ? "" : unit_for_ratio(main, true);
+    if (!of_gyro.empty()) {
+      out.push_back(
+          about_units("units.gyro", FindingSeverity::fatal,
+                      fmt::format("The gyro turns {:.3g} times as far as the wheels say with the robot file's "
+                                  "radius and track: it looks like {}.",
+                                  main, of_gyro),
+                      fmt::format("Convert gyro_z to rad/s: {} does so.",
+                                  scaling_arguments(view, {"gyro_z"}, unit_factor(of_gyro))),
+                      {"gyro_z"}, main));
+      return;
+    }
     const bool shaft = gear > 3.0 && std::abs(1.0 / main / gear - 1.0) < 0.1;
+    const bool rim = !shaft && unit.empty() && std::abs(main * view.robot.wheel_radius - 1.0) < 0.1;
+    const double factor = shaft          ? 1.0 / gear
+                          : rim          ? 1.0 / view.robot.wheel_radius
+                          : unit.empty() ? main
+                                         : unit_factor(unit);
     const std::string looks = shaft          ? " Those of the motor's shaft, before the gear?"
+                              : rim          ? fmt::format(" They look like {} at the rim.", angles ? "m" : "m/s")
                               : unit.empty() ? ""
                               : angles       ? fmt::format(" Their unit looks like that of {}.", unit)
                                              : fmt::format(" They look like {}.", unit);
-    out.push_back(about_units("units.wheel_speed", FindingSeverity::fatal,
-                              fmt::format("{} are {:.3g} times what the pose says with the robot file's radius{}.{}",
-                                          fmt::join(wheels, " and "), 1.0 / main, yaw ? " and track" : "", looks),
-                              "Convert the wheels' motion to rad and rad/s at the wheel, or correct wheel_radius.",
-                              wheels, 1.0 / main));
+    out.push_back(about_units(
+        "units.wheel_speed", FindingSeverity::fatal,
+        fmt::format("{} are {:.3g} times what {} with the robot file's radius{}.{}", fmt::join(wheels, " and "),
+                    1.0 / main, measured, yaw ? " and track" : "", looks),
+        fmt::format("Convert the wheels' motion to rad and rad/s at the wheel ({} does so{}), or correct wheel_radius.",
+                    scaling_arguments(view, motion_columns(view), factor),
+                    shaft || rim || !unit.empty() ? "" : fmt::format(", by what {}", measured)),
+        wheels, 1.0 / main));
     return;
   }
   if (lin && std::abs(std::log(*lin)) > 1.2) {
     const std::string of = unit_for_ratio(*lin, false);
     const char* looks = of == "thousandths" ? " They look like mm." : of == "hundredths" ? " They look like cm." : "";
-    out.push_back(about_units("units.position", FindingSeverity::fatal,
-                              fmt::format("x and y move {:.4g} times as far as the wheels roll.{}", *lin, looks),
-                              "Convert x and y to m.", {"x", "y"}, *lin));
+    out.push_back(about_units(
+        "units.position", FindingSeverity::fatal,
+        fmt::format("x and y move {:.4g} times as far as the wheels roll.{}", *lin, looks),
+        fmt::format("Convert x and y to m: {} does so.", scaling_arguments(view, {"x", "y"},
+                                                                           of == "thousandths"  ? 1e-3
+                                                                           : of == "hundredths" ? 1e-2
+                                                                                                : 1.0 / *lin)),
+        {"x", "y"}, *lin));
   } else if (lin && std::abs(*lin - 1.0) > 0.05) {
     out.push_back(about_units(
         "units.wheel_radius", std::abs(*lin - 1.0) > 0.15 ? FindingSeverity::warning : FindingSeverity::notice,
@@ -327,7 +401,9 @@ void check_scales(const HealthView& view, std::optional<double> lin, std::option
     out.push_back(about_units(
         "units.heading", FindingSeverity::fatal,
         fmt::format("The heading turns {:.3g} times as far as the wheels say: it looks like degrees.", *yaw),
-        "Convert theta (gyro_z) to rad (rad/s).", {"theta"}, *yaw));
+        fmt::format("Convert it to rad (rad/s): {} does so.",
+                    scaling_arguments(view, {view.column("theta") != nullptr ? "theta" : "gyro_z"}, kDegree)),
+        {"theta"}, *yaw));
   } else if (yaw && std::abs(*yaw - 1.0) > 0.1) {
     out.push_back(
         about_units("units.track_width", FindingSeverity::warning,
@@ -337,6 +413,28 @@ void check_scales(const HealthView& view, std::optional<double> lin, std::option
                     "`identify` measures, or correct track_width.",
                     {"theta"}, *yaw));
   }
+}
+
+// Counts a turn of an angle that changes by `ratio` times the integral of the speed; 0 where it is none.
+double counts_of(double ratio) {
+  constexpr double kFewestCounts = 100.0;
+  const double counts = std::round(2.0 * std::numbers::pi * ratio);
+  return counts >= kFewestCounts && unit_for_ratio(ratio, false).empty() ? counts : 0.0;
+}
+
+std::string convert_one(const HealthView& view, const JointView& joint, double ratio, const std::string& unit) {
+  const double counts = counts_of(ratio);
+  if (counts > 0.0) {
+    return fmt::format("{} makes rad of them; write the true number of counts a turn there.",
+                       scaling_arguments(view, {joint.angle_name}, 2.0 * std::numbers::pi / counts));
+  }
+  return unit.empty() ? fmt::format(
+                            "One of them has another unit, sign or gear ratio: {} makes the angle fit, {} the "
+                            "speed.",
+                            scaling_arguments(view, {joint.angle_name}, 1.0 / ratio),
+                            scaling_arguments(view, {joint.speed_name}, ratio))
+                      : fmt::format("Convert the speed: {} does so.",
+                                    scaling_arguments(view, {joint.speed_name}, unit_factor(unit)));
 }
 
 // Wheel angles against the speeds beside them.
@@ -370,12 +468,14 @@ void check_angles(const HealthView& view, std::vector<LogFinding>& out) {
         unlike ? fmt::format("{} and the integral of {} have a correlation of only {:.2f}.", j.angle_name, j.speed_name,
                              fits)
                : fmt::format("{} changes by {:.4g} times the integral of {}.{}", j.angle_name, ratio, j.speed_name,
-                             minutes        ? " The times look like min."
+                             minutes ? " The times look like min."
+                             : counts_of(ratio) > 0.0
+                                 ? fmt::format(" The angle looks like counts, {:.0f} a turn.", counts_of(ratio))
                              : unit.empty() ? ""
                                             : fmt::format(" The speed looks like {}.", unit)),
         unlike    ? "Columns of different wheels, or of different clocks: check their names (--map)."
-        : minutes ? "Convert the column t to seconds: --map t=\"COLUMN*60\" does so."
-                  : "One of them has another unit, sign or gear ratio: leave out the wrong one or convert it.",
+        : minutes ? "Convert the column t to seconds: --map t=\"*60\" does so."
+                  : convert_one(view, j, ratio, unit),
         {j.angle_name, j.speed_name}, ratio));
   }
 }
@@ -410,8 +510,58 @@ std::optional<LogTable> stretches_of(const HealthView& view) {
   return spread;
 }
 
+// The log with speeds made of the angles where it has none.
+LogTable with_speeds(const HealthView& view, const LogTable& log) {
+  LogTable out = log;
+  for (const JointView& j : view.joints) {
+    if (log.find(j.speed_name) == nullptr) {
+      out.names.push_back(j.speed_name);
+      out.columns.push_back(j.smooth);
+    }
+  }
+  return out;
+}
+
+// Wheels that roll another way a turn than the robot file's radius says, as the pose shows: mass and inertia are wrong
+// by about twice as much.
+void tell_radii(const HealthView& view, const inference::KinematicCalibration& found, std::vector<LogFinding>& out) {
+  const double r = view.robot.wheel_radius;
+  if (std::ranges::find(out, std::string("units.wheel_radius"), &LogFinding::id) != out.end()) {
+    return;
+  }
+  std::vector<std::string> wheels;
+  double worst = 0.0;
+  for (const auto& [side, radius] : {std::pair("right", &found.radius_right), {"left", &found.radius_left}}) {
+    if (radius->state != inference::KinematicState::identified) {
+      return;
+    }
+    const double off = radius->estimate / r - 1.0;
+    if (std::abs(off) > std::max(kOddRadius, kRadiusErrors * radius->standard_error / r)) {
+      wheels.push_back(fmt::format("the {} wheel by {:+.2g} % ({:.4g} ± {:.1g} m)", side, 100.0 * off, radius->estimate,
+                                   2.0 * radius->standard_error));
+      worst = std::abs(off) > std::abs(worst) ? off : worst;
+    }
+  }
+  if (wheels.empty()) {
+    return;
+  }
+  const bool both =
+      wheels.size() == 2 && std::abs(found.radius_right.estimate / found.radius_left.estimate - 1.0) < kOddRadius;
+  out.push_back(about_units(
+      "units.wheel_radius", FindingSeverity::warning,
+      fmt::format(
+          "By the pose the wheels do not roll as wheel_radius: {:.4g} says: {}. Mass and inertia come out wrong by "
+          "about twice that.",
+          r, core::listed(wheels)),
+      both ? fmt::format("Correct it: `wheel_radius: {:.4g}` in the robot file, where the pose is in m.",
+                         0.5 * (found.radius_right.estimate + found.radius_left.estimate))
+           : "A tyre is worn or soft, or of another size: make both wheels alike; `gap` weighs other causes, and "
+             "`identify` has the radii with their intervals.",
+      {"x", "y"}, 1.0 + worst));
+}
+
 void check_pose_delay(const HealthView& view, std::vector<LogFinding>& out) {
-  if (!view.robot_given || view.joints[0].speed == nullptr || view.joints[1].speed == nullptr) {
+  if (!view.robot_given || !view.has_motion()) {
     return;
   }
   inference::KinematicOptions options;
@@ -419,10 +569,21 @@ void check_pose_delay(const HealthView& view, std::vector<LogFinding>& out) {
   options.track_width = view.robot.track_width;
   options.radius = options.axle_offset = view.column("x") != nullptr && view.column("y") != nullptr;
   options.largest_delay = 0.3;
-  const std::optional<LogTable> spread = stretches_of(view);
+  const bool speeds = view.joints[0].speed != nullptr && view.joints[1].speed != nullptr;
+  const std::optional<LogTable> spread = speeds ? stretches_of(view) : std::nullopt;
   try {
-    const inference::KinematicQuantity delay =
-        inference::calibrate_kinematics(spread ? *spread : *view.log, options).delay;
+    const inference::KinematicCalibration found =
+        inference::calibrate_kinematics(spread   ? *spread
+                                        : speeds ? *view.log
+                                                 : with_speeds(view, *view.log),
+                                        options);
+    if (options.radius) {
+      tell_radii(view, found, out);
+    }
+    if (!speeds) {
+      return;
+    }
+    const inference::KinematicQuantity& delay = found.delay;
     if (delay.state == inference::KinematicState::identified) {
       const bool late = delay.estimate > 3.0 * delay.standard_error && delay.estimate > 1.5 * view.step;
       out.push_back(
@@ -497,14 +658,27 @@ void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
   const auto yaw = fit_wheels(windows, turned);
   const std::size_t before = findings.size();
   if (std::abs(scale) < 1.0) {
-    findings.push_back(about_units("units.heading", FindingSeverity::fatal,
-                                   "theta fits the direction of travel only when it is read as degrees.",
-                                   "Convert theta to rad.", {"theta"}, 1.0 / kDegree));
+    findings.push_back(about_units(
+        "units.heading", FindingSeverity::fatal, "theta fits the direction of travel only when it is read as degrees.",
+        fmt::format("Convert theta to rad: {} does so.", scaling_arguments(view, {"theta"}, kDegree)), {"theta"},
+        1.0 / kDegree));
   }
   if (scale < 0.0) {
-    findings.push_back(about_units("units.heading_sign", FindingSeverity::fatal,
-                                   "theta fits the direction of travel only with its sign turned.",
-                                   "theta has to grow counterclockwise from x to y.", {"theta"}, -1.0));
+    // Wheels that turn as theta does leave y, and not theta, for what counts the wrong way.
+    const bool as_wheels = yaw && yaw->explained > kFits && yaw->turn_clear && yaw->turn > 0.0;
+    findings.push_back(
+        as_wheels
+            ? about_units(
+                  "units.position_mirrored", FindingSeverity::fatal,
+                  "theta turns as the wheels do, but fits the direction of travel only with its sign turned: "
+                  "x, y are mirrored.",
+                  fmt::format("y has to grow to the left of x: {} does so.", scaling_arguments(view, {"y"}, -1.0)),
+                  {"x", "y"}, -1.0)
+            : about_units("units.heading_sign", FindingSeverity::fatal,
+                          "theta fits the direction of travel only with its sign turned.",
+                          fmt::format("theta has to grow counterclockwise from x to y: {} does so.",
+                                      scaling_arguments(view, {"theta"}, -1.0)),
+                          {"theta"}, -1.0));
   }
   if (aligned < kAligned) {
     findings.push_back(about_units(
@@ -514,9 +688,11 @@ void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
                     aligned),
         "Give x, y and theta in one fixed frame; the sign of driving was not checked.", {"x", "y", "theta"}, aligned));
   }
-  check_sides(yaw, forward, theta ? "theta" : "gyro_z", findings);
+  if (scale > 0.0) {
+    check_sides(view, yaw, forward, theta ? "theta" : "gyro_z", findings);
+  }
   if (theta && gyro) {
-    check_sides(fit_wheels(windows, by_gyro), std::nullopt, "gyro_z", findings);
+    check_sides(view, fit_wheels(windows, by_gyro), std::nullopt, "gyro_z", findings);
     double tt = 0.0, tg = 0.0, gg = 0.0;
     for (std::size_t k = 0; k < windows.size(); ++k) {
       tt += turned[k] * turned[k];
@@ -526,10 +702,13 @@ void check_odometry(const HealthView& view, std::vector<LogFinding>& findings) {
     const double ratio = tt > 0.0 ? tg / tt : 1.0;
     if (gg > 0.0 && tg / std::sqrt(tt * gg) > 0.9 && std::abs(ratio - 1.0) > 0.1) {
       const std::string unit = unit_for_ratio(ratio, true);
-      findings.push_back(about_units("units.gyro", ratio > 10.0 ? FindingSeverity::fatal : FindingSeverity::warning,
-                                     fmt::format("The gyro turns {:.3g} times as far as theta{}.", ratio,
-                                                 unit.empty() ? "" : fmt::format(": it looks like {}", unit)),
-                                     "Convert gyro_z to rad/s, or calibrate it.", {"gyro_z"}, ratio));
+      findings.push_back(
+          about_units("units.gyro", ratio > 10.0 ? FindingSeverity::fatal : FindingSeverity::warning,
+                      fmt::format("The gyro turns {:.3g} times as far as theta{}.", ratio,
+                                  unit.empty() ? "" : fmt::format(": it looks like {}", unit)),
+                      fmt::format("Convert gyro_z to rad/s ({} does so), or calibrate it.",
+                                  scaling_arguments(view, {"gyro_z"}, unit.empty() ? 1.0 / ratio : unit_factor(unit))),
+                      {"gyro_z"}, ratio));
     }
   }
   const auto size = [](const std::optional<WheelFit>& fit, bool of_turn, double expected) -> std::optional<double> {

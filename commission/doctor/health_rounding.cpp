@@ -187,6 +187,39 @@ Cut kind_of(const HealthView& view, const JointView& joint, double unit) {
 
 }  // namespace
 
+namespace {
+
+// Speeds in whole numbers that nothing else in the log measures: no driver rounds rad/s so, and they may be rpm.
+bool tell_whole_numbers(const HealthView& view, const JointView& joint, double unit,
+                        std::vector<LogFinding>& findings) {
+  const auto& declared = view.robot.noise.wheel_speed.value;
+  const bool whole = unit >= 1.0 && std::abs(unit - std::round(unit)) < 1e-9;
+  if (!whole || !view.robot_given || !model::on_two_wheels(view.robot) || declared.value_or(0.0) >= 0.499 * unit ||
+      joint.angle != nullptr || view.column("gyro_z") != nullptr || view.column("theta") != nullptr) {
+    return false;
+  }
+  const std::vector<std::string> columns = motion_columns(view);
+  findings.push_back(
+      {.id = "units.wheel_speed",
+       .topic = FindingTopic::units,
+       .severity = FindingSeverity::fatal,
+       .sentence =
+           fmt::format("{} has whole numbers only, up to {:.4g}: as rpm, deg/s or mm/s are logged, and rad/s are "
+                       "not; and the log has neither angles nor gyro nor pose to tell.",
+                       joint.speed_name, joint.top),
+       .next = fmt::format("Say what they are: of rpm {}, of deg/s {}, of mm/s at the rim {}; where they are rad/s, "
+                           "`noise: {{wheel_speed: {:.4g}}}` in the robot file says so.",
+                           scaling_arguments(view, columns, std::numbers::pi / 30.0),
+                           scaling_arguments(view, columns, std::numbers::pi / 180.0),
+                           scaling_arguments(view, columns, 1e-3 / view.robot.wheel_radius), unit),
+       .columns = {joint.speed_name},
+       .value = unit,
+       .unit = "rad/s"});
+  return true;
+}
+
+}  // namespace
+
 void check_rounding(const HealthView& view, std::vector<LogFinding>& findings) {
   if (!(view.step > 0.0)) {
     return;
@@ -196,6 +229,9 @@ void check_rounding(const HealthView& view, std::vector<LogFinding>& findings) {
       continue;
     }
     const double unit = unit_of(*joint.speed, joint.top);
+    if (tell_whole_numbers(view, joint, unit, findings)) {
+      return;
+    }
     if (!(unit > kMatters * joint.top) || filter::find_encoder(*joint.speed, view.step)) {
       continue;
     }

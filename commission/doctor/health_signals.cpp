@@ -18,10 +18,12 @@ namespace wheelwright::doctor {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr std::size_t kLongRun = 20;  // rows of one value from which on a column may be stuck
-constexpr double kLongTime = 0.5;     // s, likewise
-constexpr std::size_t kPinned = 5;    // rows at an extreme value that make a limit
-constexpr double kFresh = 0.6;        // distinct values per change above which a column is finely resolved
+constexpr std::size_t kManyJumps = 20;  // of a wheel angle, of rows of several sources
+constexpr double kJumpingShare = 0.01;  // of the rows, likewise
+constexpr std::size_t kLongRun = 20;    // rows of one value from which on a column may be stuck
+constexpr double kLongTime = 0.5;       // s, likewise
+constexpr std::size_t kPinned = 5;      // rows at an extreme value that make a limit
+constexpr double kFresh = 0.6;          // distinct values per change above which a column is finely resolved
 
 using Run = ValueRun;
 
@@ -129,7 +131,7 @@ void check_stuck(const HealthView& view, const Column& c, const std::vector<Run>
                         fmt::format("{} is {:.6g} in every row.", c.name, low),
                         needed ? "Check that the sensor is connected and that the right column is read (--map)." : "",
                         low, ""));
-    out.back().refuses = c.kind == ColumnKind::effort && std::ranges::count(view.moving, true) > 0;
+    out.back().refuses = needed && std::ranges::count(view.moving, true) > 0;
     return;
   }
   std::vector<bool> flagged(view.log->rows(), false);
@@ -363,7 +365,18 @@ void check_rest(const HealthView& view, const std::vector<Column>& columns, std:
 
 // Wheel angles that come back every turn.
 void check_wrapped(const HealthView& view, const ReaderCounts& reader, std::vector<LogFinding>& out) {
-  if (reader.jumps > 0) {
+  if (reader.jumps > kManyJumps &&
+      static_cast<double>(reader.jumps) > kJumpingShare * static_cast<double>(reader.rows_read)) {
+    out.push_back(
+        about("signals.two_sources", FindingSeverity::fatal, "",
+              fmt::format("Wheel angles jump as no wheel turns {} times in {} rows: these are rows of two or more "
+                          "sources, each with angles of its own.",
+                          reader.jumps, reader.rows_read),
+              "Stop all publishers of this topic but the robot's (`ros2 topic info -v TOPIC` names them), or "
+              "leave the rows of the others out of the log.",
+              static_cast<double>(reader.jumps), "1"));
+    out.back().refuses = true;
+  } else if (reader.jumps > 0) {
     out.push_back(
         about("signals.jumps", FindingSeverity::warning, "",
               fmt::format("A wheel angle jumps as no wheel turns {} time{}: the log was cut there.", reader.jumps,

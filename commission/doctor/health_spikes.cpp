@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "commission/doctor/health_efforts.hpp"
 #include "commission/doctor/log_health.hpp"
 #include "core/leaps.hpp"
 
@@ -38,9 +39,13 @@ void tell_spikes(const HealthView& view, const std::string& name, const std::vec
       leaping(rows,
               fmt::format("{} leaps away and back in {} row{}, first to {:.4g} from {:.4g}: no wheel moves so.", name,
                           rows, rows == 1 ? "" : "s", (*column)[first], (*column)[first - 1]),
-              "Leave these rows out of the log: a value that is not meant makes bounds wide, or wrong.");
+              "");
   f.columns = {name};
   set_stretches(f, view, flagged, 1.5 * view.step);
+  f.next = fmt::format(
+      "Leave these rows out of the log: a value that is not meant makes bounds wide, or wrong. "
+      "`wheelwright convert LOG rest.csv{}`{} does so.",
+      without_arguments(f), f.stretches > f.when.size() ? " and the others" : "");
   findings.push_back(std::move(f));
 }
 
@@ -50,10 +55,10 @@ void check_spikes(const HealthView& view, const ReaderCounts& reader, std::vecto
   if (reader.leaps > 0) {
     findings.push_back(leaping(
         reader.leaps,
-        fmt::format(
-            "{} of {} rows were left out: a speed, rate or angle leaps away and back within them. The first is at "
-            "{}.",
-            reader.leaps, reader.rows_read, reader.first_leap),
+        fmt::format("{} of {} rows were left out: a speed, rate, angle or effort leaps away and back within them. The "
+                    "first is at "
+                    "{}.",
+                    reader.leaps, reader.rows_read, reader.first_leap),
         "Only `detect` and `convert` read them; elsewhere they are bridged as lost rows are. Look for what disturbs "
         "the sensor or its bus."));
   }

@@ -2,12 +2,14 @@
 #include "commission/doctor/log_health.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <set>
 
 #include <fmt/format.h>
 
+#include "commission/doctor/health_efforts.hpp"
 #include "core/check.hpp"
 #include "core/even_clock.hpp"
 #include "core/for_all.hpp"
@@ -106,7 +108,7 @@ void check_rate(const HealthView& view, const ReaderCounts& reader, double secon
                              fmt::format("The median step is {:.4g} s: the time stamps look like {}, not s.", view.step,
                                          core::listed(units, " or ")),
                              reader.time_remedy.empty()
-                                 ? "Convert the column t to seconds: --map t=\"COLUMN*FACTOR\" does so."
+                                 ? "Convert the column t to seconds: --map t=\"*FACTOR\" does so."
                                  : fmt::format("Make seconds of the column t: {} does so.", reader.time_remedy),
                              view.step, "s"));
     out.back().topic = FindingTopic::units;
@@ -426,6 +428,75 @@ bool is_dead(const HealthView& view, const std::vector<double>* column, const st
   return low == high && way > kMoved;
 }
 
+// Seconds in which an angle keeps one value while the speed beside it turns the wheel, which it usually does not.
+double seconds_dead(const HealthView& view, const JointView& joint) {
+  constexpr double kLeast = 0.5;  // s
+  constexpr double kUsual = 5.0;  // times the way of a count
+  constexpr double kSlow = 0.1;   // of the top speed
+  if (joint.angle == nullptr || joint.speed == nullptr) {
+    return 0.0;
+  }
+  const std::vector<double>& t = view.log->t;
+  struct Standing {
+    double way, seconds;
+  };
+  std::vector<Standing> all;
+  std::vector<double> ways;
+  for (const ValueRun& run : value_runs(view, *joint.angle)) {
+    double at = 0.0, least = 0.0, most = 0.0, rolled = 0.0;
+    for (std::size_t k = run.first + 1; k < run.last; ++k) {
+      const double step = 0.5 * ((*joint.speed)[k] + (*joint.speed)[k - 1]) * (t[k] - t[k - 1]);
+      at += step;
+      rolled += std::abs(step);
+      least = std::min(least, at);
+      most = std::max(most, at);
+    }
+    const double seconds = t[run.last - 1] - t[run.first], way = most - least;
+    ways.push_back(way);
+    if (way > kMoved && rolled > kSlow * joint.top * seconds && seconds > kLeast) {
+      all.push_back({way, seconds});
+    }
+  }
+  const double usual = ways.empty() ? 0.0 : core::quantile(std::move(ways), 0.9);
+  double sum = 0.0;
+  for (const Standing& one : all) {
+    sum += one.way > kUsual * usual ? one.seconds : 0.0;
+  }
+  return sum;
+}
+
+// Angles that stand still for a while beside speeds that go on.
+std::optional<LogFinding> stopped_angles(const HealthView& view) {
+  std::vector<std::string> stopped, names, instead;
+  double seconds = 0.0;
+  for (const JointView& j : view.joints) {
+    if (j.angle == nullptr || j.speed == nullptr) {
+      return std::nullopt;
+    }
+    if (const double dead = seconds_dead(view, j); dead > 0.0) {
+      stopped.push_back(j.angle_name);
+      seconds = std::max(seconds, dead);
+    }
+    names.push_back(j.angle_name);
+    instead.push_back(j.speed_name);
+  }
+  if (stopped.empty()) {
+    return std::nullopt;
+  }
+  return LogFinding{
+      .id = "signals.position_zero",
+      .topic = FindingTopic::signals,
+      .severity = FindingSeverity::warning,
+      .sentence = fmt::format("{} stand{} still for {:.3g} s while {} show that the wheels turn: the speeds "
+                              "are taken, the angles are not read.",
+                              core::listed(stopped), stopped.size() == 1 ? "s" : "", seconds, core::listed(instead)),
+      .next = "Find out why the counter stopped, or leave the columns out of the log.",
+      .columns = names,
+      .value = seconds,
+      .unit = "s",
+      .hides = true};
+}
+
 // Angles that stand still beside speeds, of one wheel or of all, or speeds that do beside angles.
 std::optional<LogFinding> dead_columns(const HealthView& view) {
   for (const bool angle : {true, false}) {
@@ -455,7 +526,7 @@ std::optional<LogFinding> dead_columns(const HealthView& view) {
                         .hides = true};
     }
   }
-  return std::nullopt;
+  return stopped_angles(view);
 }
 
 LogTable without(const LogTable& log, const std::vector<std::string>& names) {
@@ -469,6 +540,32 @@ LogTable without(const LogTable& log, const std::vector<std::string>& names) {
     }
   }
   return kept;
+}
+
+}  // namespace
+
+namespace {
+
+// Wheels whose motion is not what was logged explain neither turning nor displacement, and the same holds for a
+// heading of another unit or sign: then nothing is said of the kind of drive. Rows of two sources make nonsense of
+// every unit.
+void drop_consequences(const HealthView& view, const ReaderCounts& reader, LogHealth& health) {
+  const auto motion = motion_columns(view);
+  const auto of_motion = [&](const LogFinding& f) {
+    return std::ranges::any_of(f.columns, [&](const auto& name) { return std::ranges::count(motion, name) > 0; });
+  };
+  const bool unlike = std::ranges::any_of(health.findings, [&](const LogFinding& f) {
+    constexpr std::array<std::string_view, 4> ids = {"signals.no_direction", "units.heading", "units.heading_sign",
+                                                     "units.position_mirrored"};
+    return f.severity == FindingSeverity::fatal &&
+           (std::ranges::count(ids, f.id) > 0 || (f.id == "signals.constant" && of_motion(f)) ||
+            f.id == "units.angle_and_speed");
+  });
+  const bool mixed = health.find("signals.two_sources") != nullptr;
+  std::erase_if(health.findings, [&](const LogFinding& f) {
+    const bool drive = f.id == "motion.not_differential_drive" && reader.contradictions.empty();
+    return (drive && (unlike || mixed)) || (mixed && f.topic == FindingTopic::units);
+  });
 }
 
 }  // namespace
@@ -519,6 +616,7 @@ LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, co
         },
         [&] { reaches_bounds = !check_direction(view, of_motion) && check_motion(view, of_motion); });
     std::ranges::move(of_motion, std::back_inserter(health.findings));
+    drop_consequences(view, reader, health);
     const LogFinding* smoothed = health.find("signals.speed_filter");
     if (smoothed != nullptr && smoothed->speed_filter) {  // that is why the wheels are later than a gyro
       std::erase_if(health.findings, [](const LogFinding& f) { return f.id == "time.gyro_delay"; });
@@ -679,6 +777,25 @@ void set_stretches(LogFinding& finding, const HealthView& view, const std::vecto
     }
     close();
   }
+}
+
+std::string scaling_arguments(const HealthView& view, const std::vector<std::string>& columns, double factor) {
+  std::vector<std::string> maps;
+  for (const std::string& name : columns) {
+    if (view.column(name) != nullptr) {
+      maps.push_back(fmt::format("--map {}=\"*{:.6g}\"", name, factor));
+    }
+  }
+  return fmt::format("`{}`", fmt::join(maps, " "));
+}
+
+std::vector<std::string> motion_columns(const HealthView& view) {
+  std::vector<std::string> names;
+  for (const JointView& j : view.joints) {
+    names.push_back(j.angle_name);
+    names.push_back(j.speed_name);
+  }
+  return names;
 }
 
 std::string unit_for_ratio(double ratio, bool rates) {

@@ -163,6 +163,12 @@ struct HealthView {
 /// The view of `log`, which must outlive it. Throws as examine().
 [[nodiscard]] HealthView make_view(const LogTable& log, const std::optional<Robot>& robot);
 
+/// The arguments that multiply those of these columns that the log in `view` has: `--map omega_r="*0.10472" …`.
+[[nodiscard]] std::string scaling_arguments(const HealthView& view, const std::vector<std::string>& columns,
+                                            double factor);
+/// Names of all columns of the joints' motion.
+[[nodiscard]] std::vector<std::string> motion_columns(const HealthView& view);
+
 /// Puts the stretches of rows that `flagged` marks into `finding`; marks less than `join` s apart are one stretch.
 void set_stretches(LogFinding& finding, const HealthView& view, const std::vector<bool>& flagged, double join);
 

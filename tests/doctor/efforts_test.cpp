@@ -154,6 +154,35 @@ TEST(Efforts, ThatStandStillInMotionAreNamedWithTheirPlace) {
   }
 }
 
+// Of less than half a second, where much of the torque is missing.
+TEST(Efforts, ThatStandStillForAMomentAreNamed) {
+  for (const double rate : {100.0, 250.0}) {
+    for (const Stands how : {Stands::at_zero, Stands::clamped}) {
+      LogTable log = drive({.rate = rate, .seconds = 40.0, .seed = 7});
+      const auto rows = static_cast<std::size_t>(0.4 * rate);
+      std::size_t best = 0;
+      double most = 0.0;
+      for (std::size_t k = rows; k + 2 * rows < log.rows(); ++k) {
+        double least = 1e9;
+        for (std::size_t i = k; i < k + rows; ++i) {
+          least = std::min({least, std::abs(log.columns[2][i]), std::abs(log.columns[0][i])});
+        }
+        best = least > most ? k : best;
+        most = std::max(most, least);
+      }
+      const double sign = log.columns[2][best] > 0.0 ? 1.0 : -1.0;
+      for (std::size_t i = best; i < best + rows; ++i) {
+        log.columns[2][i] = how == Stands::at_zero ? 0.0 : 0.2 * most * sign;
+      }
+      const LogHealth health = examine(log, robot_of());
+      const LogFinding* found = health.find("signals.effort_frozen");
+      ASSERT_NE(found, nullptr) << rate;
+      EXPECT_NEAR(found->when.front().lower, log.t[best], 1.5 / rate);
+      EXPECT_THAT(found->next, testing::HasSubstr("--without"));
+    }
+  }
+}
+
 TEST(Efforts, ThatAreConstantForAReasonAreSound) {
   const auto coasting = [](double t) { return std::fmod(t, 15.0) > 12.0; };
   for (const double rate : {20.0, 100.0, 250.0}) {
@@ -228,7 +257,7 @@ TEST(Efforts, InAnotherUnitAreRefusedAndALoadIsNot) {
     const LogFinding percent = with(12.5, frictions);
     EXPECT_TRUE(percent.is_refusal());
     EXPECT_THAT(percent.sentence, testing::HasSubstr("per cent of 8 N·m"));
-    EXPECT_THAT(percent.next, testing::HasSubstr("--map tau_r=\"COLUMN*0.0"));
+    EXPECT_THAT(percent.next, testing::HasSubstr("--map tau_r=\"*0.0"));
     const LogFinding thousandths = with(100.0 / 0.6, frictions);
     EXPECT_TRUE(thousandths.is_refusal());
     EXPECT_THAT(thousandths.sentence, testing::HasSubstr("thousandths of 6 N·m"));
@@ -243,6 +272,62 @@ TEST(Efforts, InAnotherUnitAreRefusedAndALoadIsNot) {
   }
   EXPECT_TRUE(with(5.0, true).is_refusal());  // per cent of 20 N·m, frictions and all
   EXPECT_EQ(with(5.0, false).severity, FindingSeverity::warning);
+}
+
+// Without a nominal mass a body that is denser than steel tells another unit; a robot of any size does not.
+TEST(Efforts, ThatMakeABodyDenserThanSteelAreRefused) {
+  for (const double size : {0.5, 1.0, 12.0}) {  // of mass and inertia, of one shape
+    const double stretch = std::cbrt(size);
+    for (const double factor : {1.0, 2.0, 100.0, 1000.0}) {
+      LogTable log = drive({.mass = 24.0 * size,
+                            .inertia = 1.3 * size * stretch * stretch,
+                            .viscous = 6.0 * size,
+                            .viscous_yaw = 0.7 * size,
+                            .effort_noise = 0.02 * size,
+                            .seed = 5});
+      for (const std::size_t c : {2U, 3U}) {
+        std::ranges::transform(log.columns[c], log.columns[c].begin(), [&](double e) { return factor * e; });
+      }
+      const LogHealth health = examine(log, robot_of());
+      const LogFinding* found = health.find("units.effort");
+      EXPECT_EQ(found != nullptr && found->is_refusal(), factor >= 100.0) << size << ' ' << factor;
+      if (found != nullptr) {
+        EXPECT_THAT(found->next, testing::HasSubstr("--map tau_r=\"*0.001\" --map tau_l=\"*0.001\""));
+      }
+    }
+  }
+}
+
+TEST(Efforts, OfOneFactorBelowALoadAreAWord) {
+  for (const double factor : {1.0, 1.5, 0.5}) {
+    LogTable log = drive({.seed = 5});
+    for (const std::size_t c : {2U, 3U}) {
+      std::ranges::transform(log.columns[c], log.columns[c].begin(), [&](double e) { return factor * e; });
+    }
+    Robot robot = robot_of();
+    robot.nominal = {{"mass", 24.0}, {"yaw_inertia", 1.3}, {"viscous_linear", 6.0}, {"viscous_yaw", 0.7}};
+    const LogHealth health = examine(log, robot);
+    const LogFinding* found = health.find("units.effort");
+    EXPECT_EQ(found != nullptr, factor != 1.0) << factor;
+    EXPECT_TRUE(found == nullptr || found->severity == FindingSeverity::warning);
+  }
+}
+
+// A command of 8 bits whose zero is in the middle of its range is not one without a sign.
+TEST(Efforts, AboutTheMiddleOfTheirRangeAreToldFromThoseWithoutASign) {
+  for (const bool offset : {true, false}) {
+    LogTable log = drive({.seed = 5});
+    for (const std::size_t c : {2U, 3U}) {
+      std::ranges::transform(log.columns[c], log.columns[c].begin(),
+                             [&](double e) { return offset ? std::round(127.5 + 50.0 * e) : std::abs(50.0 * e); });
+    }
+    const LogHealth health = examine(log, robot_of());
+    EXPECT_EQ(health.find("units.effort_offset") != nullptr, offset) << refusals(health);
+    EXPECT_EQ(health.find("units.effort_unsigned") != nullptr, !offset) << refusals(health);
+    if (offset) {
+      EXPECT_NEAR(health.find("units.effort_offset")->value, 127.5, 1.0);
+    }
+  }
 }
 
 TEST(Efforts, ThatAreSmoothedAreToldWithTheTimeConstant) {

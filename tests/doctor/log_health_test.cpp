@@ -433,6 +433,72 @@ TEST_F(LogHealthTest, WheelSpeedsInOtherUnits) {
   }
 }
 
+TEST_F(LogHealthTest, AGyroInOtherUnitsIsNotTakenForTheWheels) {
+  remove({"x", "y", "theta"});
+  scale({"gyro_z"}, 180.0 / std::numbers::pi);
+  EXPECT_THAT(expect("units.gyro", kFatal).next, ::testing::HasSubstr("--map gyro_z=\"*0.0174533\""));
+  EXPECT_EQ(examine(log, robot).find("units.wheel_speed"), nullptr);
+}
+
+TEST_F(LogHealthTest, SpeedsOfTheRimAreNamed) {
+  remove({"phi_r", "phi_l"});
+  scale({"omega_r", "omega_l"}, robot.wheel_radius);
+  EXPECT_THAT(expect("units.wheel_speed", kFatal).sentence, ::testing::HasSubstr("m/s at the rim"));
+}
+
+TEST_F(LogHealthTest, CountsBesideSpeedsAreNamedWithTheirNumber) {
+  scale({"phi_r"}, 1000.0 / (2.0 * std::numbers::pi));
+  const LogFinding found = expect("units.angle_and_speed", kFatal);
+  EXPECT_THAT(found.sentence, ::testing::HasSubstr("counts, 1000 a turn"));
+  EXPECT_THAT(found.next, ::testing::HasSubstr("--map phi_r=\"*0.00628319\""));
+}
+
+TEST_F(LogHealthTest, WheelsOfAnotherRadiusAreNamedOneByOne) {
+  EXPECT_EQ(examine(log, robot).find("units.wheel_radius"), nullptr);
+  const LogTable sound = log;
+  for (const bool angles : {true, false}) {
+    for (const double off : {0.97, 1.03}) {
+      log = sound;
+      remove({"gyro_z"});
+      if (angles) {
+        remove({"omega_r", "omega_l"});
+      } else {
+        remove({"phi_r", "phi_l"});
+      }
+      scale({angles ? "phi_l" : "omega_l"}, 1.0 / off);
+      const LogFinding found = expect("units.wheel_radius", FindingSeverity::warning);
+      EXPECT_THAT(found.sentence, ::testing::HasSubstr("the left wheel"));
+      EXPECT_THAT(found.sentence, ::testing::Not(::testing::HasSubstr("the right wheel")));
+      EXPECT_NEAR(found.value, off, 0.005);
+    }
+  }
+}
+
+TEST_F(LogHealthTest, AMirroredAxisIsNotAMirroredHeading) {
+  scale({"y"}, -1.0);
+  EXPECT_THAT(expect("units.position_mirrored", kFatal).next, ::testing::HasSubstr("--map y=\"*-1\""));
+  EXPECT_EQ(examine(log, robot).find("units.heading_sign"), nullptr);
+}
+
+// What is wrong with the wheels' columns is said, and not that the robot is another.
+TEST_F(LogHealthTest, DeadAndUnsignedWheelsAreNoOtherKindOfRobot) {
+  const LogTable sound = log;
+  remove({"x", "y", "theta", "omega_r", "omega_l"});
+  std::ranges::fill(log.column("phi_r"), 0.0);
+  EXPECT_TRUE(expect("signals.constant", kFatal).is_refusal());
+  EXPECT_EQ(examine(log, robot).find("motion.not_differential_drive"), nullptr);
+  log = sound;
+  scale({"theta"}, 180.0 / std::numbers::pi);
+  EXPECT_EQ(examine(log, robot).find("motion.not_differential_drive"), nullptr);
+}
+
+TEST_F(LogHealthTest, ManyJumpsOfAnglesAreRowsOfSeveralSources) {
+  EXPECT_EQ(examine(log, robot, {.rows_read = log.rows(), .jumps = 3}).find("signals.two_sources"), nullptr);
+  const LogHealth health = examine(log, robot, {.rows_read = log.rows(), .jumps = log.rows() / 20});
+  ASSERT_NE(health.find("signals.two_sources"), nullptr);
+  EXPECT_TRUE(health.find("signals.two_sources")->is_refusal());
+}
+
 TEST_F(LogHealthTest, AnglesAndSpeedsThatDisagree) {
   scale({"omega_l"}, 180.0 / std::numbers::pi);
   EXPECT_THAT(expect("units.angle_and_speed", kFatal, false).sentence, ::testing::HasSubstr("deg/s"));

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "commission/commission.hpp"
@@ -342,6 +343,49 @@ TEST(Speeds, AnglesThatStayZeroAreLeftOut) {
     EXPECT_TRUE(found->hides);
     EXPECT_EQ(health.verdict, LogVerdict::commission) << told(health);
   }
+}
+
+TEST(Speeds, AnglesThatStopForAWhileAreLeftOut) {
+  for (const char* name : {"phi_r", "phi_l"}) {
+    for (const double seconds : {8.0, 30.0}) {
+      LogTable log = drive({});
+      std::vector<double>& angle = log.column(name);
+      const auto last = std::min(log.rows(), static_cast<std::size_t>(2000.0 + 100.0 * seconds));
+      for (std::size_t k = 2000; k < last; ++k) {
+        angle[k] = angle[1999];
+      }
+      const LogHealth health = examine(log, robot());
+      const LogFinding* found = health.find("signals.position_zero");
+      ASSERT_NE(found, nullptr) << told(health);
+      EXPECT_TRUE(found->hides);
+      EXPECT_THAT(found->columns, ::testing::UnorderedElementsAre("phi_r", "phi_l"));
+      EXPECT_EQ(health.verdict, LogVerdict::commission) << told(health);
+    }
+  }
+}
+
+// Whole numbers beside nothing that measures the motion may be rpm; a robot file that bounds their error settles it.
+TEST(Speeds, InWholeNumbersAreRefusedWhereNothingTellsTheirUnit) {
+  LogTable log = drive({});
+  for (const char* name : {"omega_r", "omega_l"}) {
+    std::ranges::transform(log.column(name), log.column(name).begin(),
+                           [](double v) { return std::round(v * 30.0 / std::numbers::pi); });
+  }
+  for (const char* name : {"phi_r", "phi_l", "gyro_z"}) {
+    const auto at = std::ranges::find(log.names, name);
+    if (at != log.names.end()) {
+      log.columns.erase(log.columns.begin() + (at - log.names.begin()));
+      log.names.erase(at);
+    }
+  }
+  Robot declared = robot();
+  declared.noise.wheel_speed.value.reset();
+  const LogHealth health = examine(log, declared);
+  ASSERT_NE(health.find("units.wheel_speed"), nullptr) << told(health);
+  EXPECT_TRUE(health.find("units.wheel_speed")->is_refusal());
+  EXPECT_THAT(health.find("units.wheel_speed")->next, ::testing::HasSubstr("--map omega_r=\"*0.10472\""));
+  declared.noise.wheel_speed.value = 1.0;
+  EXPECT_EQ(examine(log, declared).find("units.wheel_speed"), nullptr);
 }
 
 }  // namespace

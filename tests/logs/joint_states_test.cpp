@@ -294,7 +294,7 @@ TEST_F(JointStates, NamesWithoutASideAreToldWithTheMapThatReadsThem) {
   publish({right_wheel("motor_1"), left_wheel("motor_2")});
   LogOptions options;
   options.only = std::vector<std::string>{"omega_r", "omega_l", "tau_r", "tau_l"};
-  EXPECT_THAT(refusal(options), HasSubstr("--map"));
+  EXPECT_THAT(refusal(options), HasSubstr("--map \"omega_r=velocity[motor_1]\""));
   options.map = {{"omega_r", "velocity[motor_1]"},
                  {"tau_r", "effort[motor_1]"},
                  {"omega_l", "velocity[motor_2]"},
