@@ -513,7 +513,7 @@ void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fi
 }
 
 ShiftWeight weigh_shift(const EffortTiming& timing, const Explained& explained, double step) {
-  constexpr double kMuchExplained = 0.9;  // of the residual: more is left where errors merely look like a shift
+  constexpr double kMuchExplained = 0.75;  // of the residual: more is left where errors merely look like a shift
   const Eigen::Index last = explained.noise.size() - 1;
   const auto beyond = [&](double errors) {
     return timing.beyond() - std::max(errors * timing.standard_error, kLeastShift * step) - explained.in_doubt[last];

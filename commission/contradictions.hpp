@@ -87,7 +87,7 @@ struct SignalFindings {
 enum class ShiftWeight {
   explained,  ///< none, by chance or by what is unknown between samples
   doubted,    ///< chance does not explain it: nothing is called guaranteed
-  told,       ///< the worst noise does not either, or a tenth of the residual goes with it: no model
+  told,       ///< the worst noise does not either, or a quarter of the residual goes with it: no model
 };
 
 /// Weighs `timing` in a log of declared noise, of steps of `step` (s), against `explained`.

@@ -116,7 +116,11 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   const Eigen::VectorXd of_motion = (bounded.dY + (bounded.Y - rows.Y).cwiseAbs()) * largest;
   const Eigen::VectorXd doubt = of_motion + bounded.dy + (bounded.y - rows.y).cwiseAbs();
   Eigen::VectorXd in_doubt = g.cwiseAbs().transpose() * doubt;
-  in_doubt[fitted] = g.col(fitted).cwiseAbs().dot(of_motion);  // EffortTiming::allowed has what efforts do
+  const bool held_between =
+      s.measurement.hold == Hold::zero_order && s.measurement.changes == model::EffortChanges::between;
+  if (held_between || s.measurement.delay != Interval{}) {
+    in_doubt[fitted] = g.col(fitted).cwiseAbs().dot(of_motion);  // EffortTiming::allowed has what efforts do
+  }
   filter::ErrorInfluence influence(s.model, s.filter, s.measurement, noise_budget(s.robot, s.measurement).sensors,
                                    theta, fitted + 1);
   influence.add(rows, g);

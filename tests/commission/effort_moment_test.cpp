@@ -10,6 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "commission/commission.hpp"
+#include "commission/contradictions.hpp"
+#include "commission/evidence.hpp"
 #include "tests/support/random.hpp"
 
 namespace wheelwright::commission::effort_moment_test {
@@ -166,6 +168,32 @@ TEST(EffortMoment, BeyondTheStepTakesTheGuaranteeAsSoonAsTheLogShowsIt) {
   }
   EXPECT_GT(refused, 0U);
   EXPECT_GT(doubted, 0U);
+}
+
+// A shift of 0.6 steps of 10 ms beyond what is allowed, known to `errors` standard errors.
+EffortTiming shift_of(double errors, double left) {
+  const double score = errors / 6.0;  // of what is certain
+  return {.delay = 0.016,
+          .standard_error = 0.006 / errors,
+          .freedom = 1e3,
+          .allowed = {0.0, 0.01},
+          .residual_ratio = left,
+          .mirror_ratio = 1.1,
+          .score = score,
+          .moved = 5.0};
+}
+
+TEST(EffortMoment, AShiftWeighsByWhatExplainsIt) {
+  const auto explained = [](double doubt, double noise) {
+    return Explained{Eigen::VectorXd::Constant(5, doubt), Eigen::VectorXd::Constant(5, noise)};
+  };
+  constexpr double kStep = 0.01;
+  EXPECT_EQ(weigh_shift(shift_of(2.0, 0.99), explained(0.0, 0.0), kStep), ShiftWeight::explained);
+  EXPECT_EQ(weigh_shift(shift_of(4.0, 0.99), explained(0.0, 0.0), kStep), ShiftWeight::doubted);
+  EXPECT_EQ(weigh_shift(shift_of(40.0, 0.95), explained(0.0, 0.0), kStep), ShiftWeight::told);
+  EXPECT_EQ(weigh_shift(shift_of(40.0, 0.95), explained(0.0, 0.1), kStep), ShiftWeight::doubted);
+  EXPECT_EQ(weigh_shift(shift_of(40.0, 0.5), explained(0.0, 0.1), kStep), ShiftWeight::told);
+  EXPECT_EQ(weigh_shift(shift_of(40.0, 0.5), explained(0.1, 0.0), kStep), ShiftWeight::explained);
 }
 
 }  // namespace
