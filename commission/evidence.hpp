@@ -25,8 +25,8 @@ struct Explained {
 
 /// Explained for least squares' estimate of each parameter (p entries) and of a constant shift of the efforts (the last
 /// entry, s), over the first `most_rows` rows of `log`. `errors` are those of the rows that made the set, `box` its
-/// hull. Of a shift the moment at which held efforts change counts as nothing: EffortTiming::allowed has it. Zeros where
-/// noise is not declared. Walks the log twice.
+/// hull. The moment at which held efforts change counts as nothing for a shift: EffortTiming::allowed has it. Zeros
+/// where noise is not declared. Walks the log twice.
 [[nodiscard]] Explained explained_by_errors(LogSource& log, const Setting& setting, const Fit& fit,
                                             const filter::SignalErrors& errors, const Box& box,
                                             std::size_t most_rows = 60000);
