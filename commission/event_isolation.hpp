@@ -33,8 +33,8 @@ struct EventIsolationOptions {
                                                               const Detection& detection,
                                                               const EventIsolationOptions& options = {});
 
-/// A finding that is consistent, for people: "the right wheel's radius changes by the share 3.1 to 5.2 % since 12.4 to
-/// 12.6 s".
+/// A finding that is consistent, for people: "the right wheel's radius changes by 3.1 to 5.2 %, since 12.40 to
+/// 12.62 s, if it was a step that stays". That condition is said of every fault whose size may grow.
 [[nodiscard]] std::string sentence(const detector::FaultFinding& finding);
 
 /// All findings in a sentence: "consistent with: …; …. Excluded: …. Not examined: …", or that nothing in the catalogue

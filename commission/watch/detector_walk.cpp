@@ -323,7 +323,8 @@ std::string sentence(const detector::FaultFinding& finding) {
   } else if (finding.at_risk && finding.at_risk->magnitude) {
     text += ", at the stated risk" + size_words(*finding.at_risk->magnitude, fault);
   }
-  return text;
+  // What is there or not, and a drift with its own rise, are what they are said to be.
+  return text + (fault.whole || !fault.profile.jumps() ? "" : ", if it was a step that stays");
 }
 
 std::string sentence(const detector::Isolation& isolation) {

@@ -3,6 +3,10 @@
 /// Fault isolation after an alarm: the faults that the data still allow, with bounds on size and onset. Set-valued,
 /// with proofs.
 ///
+/// **All of it is of faults that are steps and stay**: of one size from one onset on (a drift: with the rise that the
+/// catalogue gives it). A fault that takes longer to come than a few samples is none: its size and its onset may lie
+/// outside the intervals, and its kind may be excluded.
+///
 /// A fault of size κ that set in in [T_a, T_b] explains the rows of a window when one θ of the feasible set P satisfies
 /// all of them, before and after (onset_rows.hpp), in all outputs:
 ///
@@ -17,7 +21,7 @@
 /// does not get narrower is cut in two. A program proved infeasible excludes the piece. The intervals of onsets are cut
 /// in two alike.
 ///
-/// **So the true fault is never excluded, and its size and onset lie in the intervals**, where the model and the
+/// **So a step that stays is never excluded, and its size and onset lie in the intervals**, where the model and the
 /// sensors' bounds hold and the fault is of the catalogue. The intervals are outer bounds: where the budget runs out
 /// they are wider, never wrong. Where bounds are estimated (ē) the proof stands on them.
 ///
@@ -55,11 +59,13 @@ struct IsolationOptions {
   std::size_t threads = 1;         ///< the result does not depend on it
 };
 
-/// What sums over all scales leave of a fault that is not excluded otherwise, at the stated risk (sum_isolation.hpp).
+/// What sums over all scales leave of a fault that is not excluded otherwise, at the stated risk, if it is a step that
+/// stays (sum_isolation.hpp).
 struct SumFinding {
-  bool excluded = false;              ///< no size and onset explains the looks at the sums, but for the risk
-  std::optional<Interval> magnitude;  ///< where it is not excluded and has a size: holds the true one, but for the risk
-  Interval onset{};                   ///< where it is not excluded: holds the true one, but for the risk, s
+  bool excluded = false;  ///< no size and onset explains the looks at the sums, but for the risk
+  std::optional<Interval>
+      magnitude;     ///< where it is not excluded and has a size: holds that of a step, but for the risk
+  Interval onset{};  ///< where it is not excluded: holds that of a step, but for the risk, s
 };
 
 /// Finding on one fault.
@@ -67,13 +73,13 @@ struct FaultFinding {
   /// Kinds of answers.
   enum class Verdict {
     consistent,   ///< not excluded
-    excluded,     ///< proved: no size, onset, θ and noise explains the window
+    excluded,     ///< proved: no step of any size and onset, θ and noise explains the window
     not_examined  ///< its rows are not known (a bump of unknown phase, OnsetRows::knows())
   };
   FaultType fault;
   Verdict verdict = Verdict::not_examined;
-  std::optional<Interval> magnitude;  ///< where consistent, unless it is there or not: holds the true one
-  Interval onset{};                   ///< where consistent: holds the true one, s
+  std::optional<Interval> magnitude;  ///< where consistent, unless it is there or not: holds that of a step
+  Interval onset{};                   ///< where consistent: holds that of a step, s
   bool earlier = false;               ///< the onset may also lie before the window (then onset.lower is its beginning)
   bool complete = true;               ///< the budget sufficed
   std::size_t programs = 0;           ///< linear programs that were solved

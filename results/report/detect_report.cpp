@@ -121,8 +121,10 @@ std::string isolation_section(const std::vector<detector::Isolation>& isolations
   }
   return paragraph(
              "Which faults of the catalogue the data around each alarm leave possible. What is excluded is proved to "
-             "explain them with no size, no onset, no parameters of the feasible set and no admissible noise; the true "
-             "size and onset of a fault of the catalogue lie in the intervals. What is said at the stated risk stands "
+             "explain them with no size, no onset, no parameters of the feasible set and no admissible noise, if they "
+             "are steps that stay: of such a fault of the catalogue the true size and onset lie in the intervals. A "
+             "fault that came slowly may be excluded, or its size and onset may lie elsewhere. What is said at the "
+             "stated risk stands "
              "on "
              "sums over scales, and on errors that average out.") +
          table({"", "Still possible", "other faults"}, rows);

@@ -49,14 +49,19 @@ std::string first_isolation(const std::vector<detector::Isolation>& isolations) 
   }
   const std::size_t excluded = isolations.front().count(detector::FaultFinding::Verdict::excluded);
   if (possible.empty()) {
-    return fmt::format("No fault of the catalogue explains the first event: {} are excluded by proof.", excluded);
+    return fmt::format(
+        "No fault of the catalogue explains the first event: {} are excluded by proof, each as a step that "
+        "stays.",
+        excluded);
   }
   const std::size_t left = isolations.front().count_at_risk();
   const std::string fewer =
       left < possible.size() ? fmt::format(" At the stated risk {} of these {} left.", left, left == 1 ? "is" : "are")
                              : std::string();
-  return fmt::format("{} faults of the catalogue are excluded by proof for the first event; possible {}: {}.{}",
-                     excluded, possible.size() == 1 ? "remains" : "remain", fmt::join(possible, "; or "), fewer);
+  return fmt::format(
+      "{} faults of the catalogue are excluded by proof for the first event, each as a step that stays; possible "
+      "{}: {}.{}",
+      excluded, possible.size() == 1 ? "remains" : "remain", fmt::join(possible, "; or "), fewer);
 }
 
 }  // namespace
