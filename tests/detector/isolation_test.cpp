@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// After an alarm the true fault is never excluded, and its size and onset lie in the intervals.
+// After an alarm a true step that stays is never excluded, and its size and onset lie in the intervals.
 #include <algorithm>
 #include <cmath>
 #include <optional>
