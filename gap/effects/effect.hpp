@@ -192,8 +192,8 @@ template <typename Function>
 
 /// The column of a robot whose coordinates move faster than its joints show, by `speed` (one signal per coordinate,
 /// empty for zeros): the base model's effort for that motion; for a robot on wheels also its body velocity. Of its
-/// viscous friction the share `friction`, 0 to 1: friction in the joints knows nothing of what they do not show. Terms of
-/// the base model that are functions of the motion are taken as they are.
+/// viscous friction the share `friction`, 0 to 1: friction in the joints knows nothing of what they do not show. Terms
+/// of the base model that are functions of the motion are taken as they are.
 [[nodiscard]] Column unseen_motion(const Drive& drive, const std::vector<Eigen::VectorXd>& speed, double friction);
 
 /// The same for wheels whose rims move faster by `right` and `left`, m/s.
@@ -217,14 +217,15 @@ void add(Column& a, const Column& b);
 /// The shape of an effect of one wheel (0 right, 1 left) or of both with opposite signs (2).
 [[nodiscard]] ShapeParameter side_or_opposite();
 
-/// The shape that says which share of viscous friction acts on the body, by 1 (as the paper's model has it), one half or
-/// 0 (all of it in the joints): lengths of the robot act on the torque by it, and a robot file does not say it.
+/// The shape that says which share of viscous friction acts on the body, by 1 (as the paper's model has it), one half
+/// or 0 (all of it in the joints): lengths of the robot act on the torque by it, and a robot file does not say it.
 [[nodiscard]] ShapeParameter friction_on_body();
 
 /// The value of that shape in `shape` of `effect`; 1 for an effect without it.
 [[nodiscard]] double friction_on_body(const Effect& effect, std::span<const double> shape);
 
-/// The factors of the shape of one wheel or both, the first of `shape` (0 where there is none), at the right and the left wheel.
+/// The factors of the shape of one wheel or both, the first of `shape` (0 where there is none), at the right and the
+/// left wheel.
 [[nodiscard]] Eigen::Vector2d side_factors(std::span<const double> shape);
 
 /// The signals of that shape: `right`, `left` or [right, −left]; empty where a wheel has none.

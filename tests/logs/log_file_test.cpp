@@ -812,8 +812,8 @@ TEST_F(LogFile, PiecesOfHdf5ThatWereNeverWrittenAreRefused) {
   EXPECT_THAT(input_error([&] { read({file}); }), HasSubstr("were never written or are lost"));
 }
 
-// Of speeds and efforts that leap in a row or two at known places: what is left are all other rows, as they were, in any
-// blocks.
+// Of speeds and efforts that leap in a row or two at known places: what is left are all other rows, as they were, in
+// any blocks.
 TEST_F(LogFile, RowsThatLeapAreLeftOutAndCountedOnRequest) {
   std::string text = "t,omega_r,omega_l,tau_r,tau_l\n";
   const std::vector<int> leaps = {40, 41, 60, 90, 150, 300, 302, 398};

@@ -158,6 +158,19 @@ class MetLogs(unittest.TestCase):
         self.assertTrue(out + err)
         self.assertNotRegex(out + err, r"[−-]\d[\d.]* s carr")
 
+    def test_one_wheels_radius_is_not_its_encoders_scale(self):
+        case = self.case("wheel_radius")
+        for log, cause, share in (("log_L-3", "wheel_radius_asymmetric", -0.03),
+                                  ("log_R+3", "wheel_radius_asymmetric", 0.03), ("encoder_l", "encoder_scale", -0.03)):
+            with self.subTest(log):
+                _, out, err = self.ask("gap", case / f"{log}.csv", "--robot", case / "robot.yaml", "--baseline",
+                                       case / "healthy.csv", "--json", "--quiet", "--no-shrink", "--no-manoeuvre")
+                self.assertTrue(out, err)
+                causes = json.loads(out)["causes"]
+                self.assertEqual([c["effect"] for c in causes], [cause], causes)
+                self.assertTrue(any(p["lower"] <= share <= p["upper"] for p in causes[0]["parameters"].values()
+                                    if p["lower"] is not None), causes)
+
     def test_counts_without_direction_are_named(self):
         case = self.case("ticks_20")
         self.assertRegex("\n".join(self.findings(case / "log.csv", case / "robot.yaml").values()), r"(?i)direction")
