@@ -263,17 +263,19 @@ void check_delay(const HealthView& view, LogSource& log, const Setting& s, const
   }
   const double delay = shift->delay, steps = delay / view.step;
   const std::optional<TakenLag> lag = find_lag(view, log, s, fit, timing);
-  const bool taken = is_taken(view, lag) && explains(view, with(view.robot, *lag));
+  const bool tried = is_taken(view, lag);
+  const bool taken = tried && explains(view, with(view.robot, *lag));
   const bool matters = timing.likely || (std::abs(delay) > 3.0 * shift->standard_error &&
                                          shift->residual_ratio < 0.95 && std::abs(steps) > 0.25);
   const bool large = matters && std::abs(steps) > 0.75;
-  const bool refused = view.robot_given && timing.told && !taken;
+  const bool blamed = timing.told || (!timing.declared.a_set && timing.likely && !tried);
+  const bool refused = view.robot_given && blamed && !taken;
   LogFinding f{.id = "time.effort_delay",
                .topic = FindingTopic::time,
-               .severity = refused                           ? FindingSeverity::fatal
-                           : large || timing.likely || taken ? FindingSeverity::warning
-                           : matters                         ? FindingSeverity::notice
-                                                             : FindingSeverity::fine};
+               .severity = refused                                                 ? FindingSeverity::fatal
+                           : large || (view.robot_given && timing.likely) || taken ? FindingSeverity::warning
+                           : matters                                               ? FindingSeverity::notice
+                                                                                   : FindingSeverity::fine};
   f.columns = s.measurement.effort_columns;
   f.value = delay;
   f.unit = std::string("s");
@@ -291,8 +293,8 @@ void check_delay(const HealthView& view, LogSource& log, const Setting& s, const
     f.sentence += fmt::format(" Efforts with {} look like that.", lag->words());
   }
   out.push_back(f);
-  if (!timing.declared.a_set && !taken) {
-    tell_unexplained(lag ? "even with its efforts so late, " : "", out);
+  if (!timing.declared.a_set && !taken && !refused) {
+    tell_unexplained(tried ? "even with its efforts so late, " : "", out);
   }
 }
 

@@ -746,12 +746,6 @@ void CsvRowReader::begin_clock(std::optional<std::int64_t> count) {
     if (since_1970 || !clock_.unit.empty()) {
       clock_.origin = common_origin(shared_origin_, second);
     }
-  } else if (const CountUnit* of = !count && time_factor_ == 1.0 && t > limits_[0] ? unit_since_1970(t) : nullptr) {
-    clock_.unit = of->name;
-    time_factor_ = of->seconds;
-    clock_.kind = Clock::Kind::epoch;
-    clock_.zone = "UTC";
-    clock_.origin = common_origin(shared_origin_, static_cast<std::int64_t>(std::floor(t * of->seconds)));
   } else if (!keep_seconds_) {
     const bool serial = time_factor_ == a_day;
     const double seconds = (t - (serial ? day_of_1970 : 0.0)) * time_factor_;
@@ -776,6 +770,15 @@ void CsvRowReader::convert_time(std::string_view text) {
   const bool whole = begins_whole && end == last;
   if (clock_.kind == Clock::Kind::unknown) {
     begin_clock(whole ? std::optional(count) : std::nullopt);
+    const bool decimals = begins_whole && !whole && *end == '.';
+    const CountUnit* const unit = decimals && time_factor_ == 1.0 && t > limits_[0] ? unit_since_1970(t) : nullptr;
+    if (unit != nullptr && clock_.kind == Clock::Kind::plain) {
+      clock_.unit = unit->name;
+      time_factor_ = unit->seconds;
+      clock_.kind = Clock::Kind::epoch;
+      clock_.zone = "UTC";
+      clock_.origin = common_origin(shared_origin_, static_cast<std::int64_t>(std::floor(t * unit->seconds)));
+    }
   }
   const auto origin = static_cast<double>(clock_.origin);
   switch (clock_.kind) {

@@ -554,6 +554,7 @@ void RowLog::keep(const RowWalk& walk, bool starts) {
 
 void RowLog::judge() const {
   constexpr std::size_t fewest_duplicates = 20;
+  constexpr std::size_t fewest_resets = 10;
   constexpr double most_resets = 0.1;  // of the rows
   const std::string in_order =
       "; where t is the first column of a table, (head -n 1 LOG; tail -n +2 LOG | sort -g) > sorted.csv sorts it";
@@ -576,7 +577,8 @@ void RowLog::judge() const {
     throw InputError(where + ": column t never increases: expected times in seconds, one row after the other" +
                      in_order);
   }
-  if (static_cast<double>(report_.resets.count) > most_resets * static_cast<double>(report_.rows)) {
+  if (report_.resets.count >= fewest_resets &&
+      static_cast<double>(report_.resets.count) > most_resets * static_cast<double>(report_.rows)) {
     throw InputError(
         fmt::format("{}: time goes back in {} of {} rows (first at {}): expected rows in the order of their "
                     "times{}",

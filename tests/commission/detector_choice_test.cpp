@@ -42,6 +42,7 @@ Scenario speeds_drive() {
   s.robot.noise.effort.value = 0.02;
   s.robot.noise.wheel_speed.value = 0.01;
   s.robot.filter = {};
+  s.robot.wheel_directions_checked = true;
   s.seed = 3;
   return s;
 }

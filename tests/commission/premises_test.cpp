@@ -124,6 +124,7 @@ Robot robot_of(const World& world, double bias = -1.0) {
   Robot robot;
   robot.wheel_radius = kRadius;
   robot.track_width = kTrack;
+  robot.wheel_directions_checked = true;
   robot.hold = Hold::zero_order;
   robot.effort_changes = model::EffortChanges::at_samples;
   robot.parameters = std::vector<std::string>{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
@@ -320,15 +321,15 @@ TEST(Premises, AWeighedMassTellsAGainOfTheEfforts) {
 TEST(Premises, ARobotThatMostlyTurnsWithoutAGyroMayHaveAMirroredWheel) {
   World world;
   world.turns = true;
-  const Commissioning c = commissioned(world, robot_of(world));
+  Robot unseen = robot_of(world);
+  unseen.wheel_directions_checked = false;
+  const Commissioning c = commissioned(world, unseen);
   EXPECT_EQ(of(c, "wheel_directions").verdict, Verdict::fails);
   EXPECT_NE(c.model.warrant, core::Warrant::guaranteed);
   EXPECT_THAT(of(c, "wheel_directions").detail, HasSubstr("wheel_directions: checked"));
-  Robot seen = robot_of(world);
-  seen.wheel_directions_checked = true;
-  EXPECT_EQ(of(commissioned(world, seen), "wheel_directions").verdict, Verdict::not_tested);
-  world.turns = false;
   EXPECT_EQ(of(commissioned(world, robot_of(world)), "wheel_directions").verdict, Verdict::not_tested);
+  world.turns = false;
+  EXPECT_EQ(of(commissioned(world, unseen), "wheel_directions").verdict, Verdict::not_tested);
 }
 
 // Whatever makes sums stand out, friction, change and lengths may be it.

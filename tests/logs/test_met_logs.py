@@ -12,6 +12,8 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import skip
+
 CASES = Path(os.environ.get("WHEELWRIGHT_CASES", ""))
 PROGRAM = os.environ.get("WHEELWRIGHT_PROGRAM", "")
 # The robot of ../shared/cases/world.py.
@@ -21,8 +23,7 @@ TRUTH = {"mass": 24.0, "yaw_inertia": 1.3, "viscous_linear": 6.0, "viscous_yaw":
 class MetLogs(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        if not PROGRAM or not (CASES / "give.py").is_file():
-            raise unittest.SkipTest(f"no logs in '{CASES}'")
+        skip.skip_without_recordings((CASES / "give.py").is_file(), f"no logs in '{CASES}'")
         cls.scratch = tempfile.TemporaryDirectory()
         cls.folder = Path(cls.scratch.name)
 
@@ -200,5 +201,4 @@ class MetLogs(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    result = unittest.main(exit=False).result
-    sys.exit(1 if not result.wasSuccessful() else 77 if result.skipped else 0)
+    skip.main()

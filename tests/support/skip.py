@@ -17,6 +17,13 @@ def skip_unless(test, there, why):
     test.skipTest(why)
 
 
+def skip_without_recordings(there, why):
+    """The same for what does not ship with the project: skipped where `there` is false, in CI as well. For setUpClass
+    too."""
+    if not there:
+        raise unittest.SkipTest(why)
+
+
 def main(argv=None):
     """Runs the tests of the file that calls it, then ends with 1 where one failed, and else with 77, which ctest calls
     skipped, where one was skipped. Each reason is printed."""
