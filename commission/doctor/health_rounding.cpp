@@ -185,10 +185,6 @@ Cut kind_of(const HealthView& view, const JointView& joint, double unit) {
                                                     : Cut::unknown;
 }
 
-}  // namespace
-
-namespace {
-
 // Speeds in whole numbers that nothing else in the log measures: no driver rounds rad/s so, and they may be rpm.
 bool tell_whole_numbers(const HealthView& view, const JointView& joint, double unit,
                         std::vector<LogFinding>& findings) {

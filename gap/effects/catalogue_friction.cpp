@@ -21,6 +21,7 @@ std::vector<Signal> speed_signs(const Drive& drive) {
 Effect coulomb() {
   return {.name = "coulomb",
           .sentence = "Dry friction at every joint: a torque of constant size against the motion.",
+          .family = "dry_friction",
           .parameters = {{"c", "N·m", 1}},
           .excite = "reverse often, turn on the spot, drive at several speeds",
           .measured_by = DirectMeasurement::lifted_wheels,
@@ -56,6 +57,7 @@ ShapeParameter bending() {
 Effect coulomb_of_bristles() {
   return {.name = "coulomb",
           .sentence = "Dry friction at every joint, whose contacts bend a little before they slide.",
+          .family = "dry_friction",
           .parameters = {{"c", "N·m", 1}},
           .shapes = {bending()},
           .excite = "reverse often, turn on the spot, drive at several speeds",
@@ -73,6 +75,7 @@ Effect coulomb_of_bristles() {
 Effect coulomb_smoothed() {
   return {.name = "coulomb",
           .sentence = "Dry friction at every joint that grows to its full size within a small speed.",
+          .family = "dry_friction",
           .parameters = {{"c", "N·m", 1}},
           .shapes = {{.name = "width",
                       .unit = "rad/s",

@@ -335,23 +335,6 @@ const Effect* find_effect(const std::vector<Effect>& catalogue, std::string_view
   return found == catalogue.end() ? nullptr : &*found;
 }
 
-std::span<const EffectFamily> effect_families() {
-  static constexpr std::array<EffectFamily, 2> kFamilies{{
-      {"late_torque", "torque that comes late (lag, delay or clock)",
-       "steps of the torque tell them apart, which a delay moves and a lag rounds, or the motor's current on the clock "
-       "of the encoders; a clock's offset shows in the pose, too"},
-      {"rolling_distance", "the rolling distance per count of one wheel (its radius or its encoder)",
-       "a larger wheel asks for more torque for the same force, another scale of its encoder does not; or measure the "
-       "wheel's circumference and a turn of its encoder by hand"},
-  }};
-  return kFamilies;
-}
-
-const EffectFamily* find_family(std::string_view name) {
-  const auto found = std::ranges::find(effect_families(), name, &EffectFamily::name);
-  return found == effect_families().end() ? nullptr : &*found;
-}
-
 std::string catalogue_noun(std::string_view name) {
   const auto law = std::ranges::find(model::effect_laws(), name, &model::EffectLaw::name);
   if (law != model::effect_laws().end()) {

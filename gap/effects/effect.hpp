@@ -80,20 +80,6 @@ enum class DirectMeasurement {
   none,
 };
 
-/// Effects that are one answer: what is wrong and its size are the same whichever of them it is. They are the laws by
-/// which that acts, and are listed with the answer.
-struct EffectFamily {
-  std::string_view name;   ///< as Effect::family and results have it
-  std::string_view noun;   ///< of the answer in sentences, with its laws
-  std::string_view apart;  ///< what tells the laws apart
-};
-
-/// The families of the catalogue. Effects of a user's own may have others.
-[[nodiscard]] std::span<const EffectFamily> effect_families();
-
-/// The family of that name, or null.
-[[nodiscard]] const EffectFamily* find_family(std::string_view name);
-
 /// One unmodelled effect, or one parametric cause. An effect that follows one of several laws, which have other columns
 /// (friction that bends before it slides; slip as a speed or as a share of one), is several of the same name: at most
 /// one of them is in a set of causes.
@@ -101,7 +87,7 @@ struct Effect {
   std::string name{};                     ///< as in results
   std::string noun{};                     ///< as sentences call it; empty: as catalogue_noun(name)
   std::string sentence{};                 ///< description for people
-  std::string family{};                   ///< of effects that are told as one answer (EffectFamily); empty: none
+  std::string family{};                   ///< name shared by effects that are the same cause; empty: none
   std::vector<std::string> steady{};      ///< causes that it is when nothing changes in time: no rival of them
   std::string common{};                   ///< parametric cause that is a part of this effect: unequal gains have a
                                           ///< mean. Where both are found it is one cause; empty: none

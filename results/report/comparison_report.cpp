@@ -66,10 +66,7 @@ std::string set_section(const SetComparison& sets) {
 std::string guesses_section(const std::vector<commission::GuessChange>& guesses) {
   std::vector<std::vector<Cell>> rows;
   for (const commission::GuessChange& each : guesses) {
-    const auto cell = [&](const commission::BestGuess& guess) {
-      const double reach = 2.0 * guess.standard_error;
-      return numeric(escape(beside(guess.value, guess.value - reach, guess.value + reach) + " ± " + number(reach, 2)));
-    };
+    const auto cell = [](const commission::BestGuess& guess) { return numeric(escape(value_words(guess))); };
     const std::string unit = unit_of(each.before.unit);
     rows.push_back({escape(spaced(each.before.quantity) + (unit.empty() ? "" : ", " + unit)), cell(each.before),
                     cell(each.after), numeric(number(each.standard_errors(), 2)),

@@ -53,13 +53,15 @@ std::string set_words(const SetComparison& sets) {
                                : std::string(core::warrant_word(sets.warrant)));
 }
 
+std::string value_words(const commission::BestGuess& guess) {
+  const double reach = 2.0 * guess.standard_error;
+  return fmt::format("{} ± {}", beside(guess.value, guess.value - reach, guess.value + reach), number(reach, 2));
+}
+
 std::string guess_words(const GuessChange& change) {
-  const auto spread = [](const commission::BestGuess& guess) {
-    const double reach = 2.0 * guess.standard_error;
-    return fmt::format("{} ± {}", beside(guess.value, guess.value - reach, guess.value + reach), number(reach, 2));
-  };
-  return fmt::format("{} {} → {} ({:.0f} standard errors)", spaced(change.before.quantity), spread(change.before),
-                     with_unit(spread(change.after), unit_of(change.before.unit)), std::abs(change.standard_errors()));
+  return fmt::format("{} {} → {} ({:.0f} standard errors)", spaced(change.before.quantity), value_words(change.before),
+                     with_unit(value_words(change.after), unit_of(change.before.unit)),
+                     std::abs(change.standard_errors()));
 }
 
 std::string verdict(const ModelComparison& comparison) {

@@ -20,6 +20,9 @@ namespace wheelwright::words {
 /// The answer in one sentence.
 [[nodiscard]] std::string verdict(const commission::ModelComparison& comparison);
 
+/// "0.759 ± 0.021", with two standard errors behind the ±.
+[[nodiscard]] std::string value_words(const commission::BestGuess& guess);
+
 /// "coulomb 0.759 ± 0.023 → 0.447 ± 0.016 N·m (22 standard errors)", with two standard errors behind the ±.
 [[nodiscard]] std::string guess_words(const commission::GuessChange& change);
 
