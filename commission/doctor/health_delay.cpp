@@ -64,18 +64,6 @@ Timing timing_of(const HealthView& view, LogSource& log, const Setting& s, const
   return timing;
 }
 
-// Whether declared errors leave parameters that explain the log, read as `robot` says; true where none are declared.
-bool explains(const HealthView& view, const Robot& robot) {
-  constexpr double kUnusedRisk = 1e-3;
-  TableSource log(*view.log);
-  const Setting s = commission::settle(log, robot);
-  if (!s.noise_complete) {
-    return true;
-  }
-  const Fit fit = commission::fit_log(log, s, commission::Part::everything, kUnusedRisk);
-  return commission::within_declared(log, s, fit, std::nullopt).a_set;
-}
-
 void tell_unexplained(const char* even_so, std::vector<LogFinding>& out) {
   out.push_back({.id = "motion.refused",
                  .topic = FindingTopic::motion,
@@ -138,7 +126,7 @@ bool check_effort_filter(const HealthView& view, LogSource& log, const Setting& 
   out.push_back(std::move(f));
   Robot robot = view.robot;
   robot.effort_smoothing = range;
-  if (!explains(view, robot)) {
+  if (s.noise_complete && !read_as(log, robot).explained) {
     tell_unexplained("even with its efforts so read, ", out);
   }
   return true;
@@ -245,6 +233,16 @@ std::string shift_in_words(const Setting& s, const EffortTiming& shift, bool mat
 
 }  // namespace
 
+OtherReading read_as(LogSource& log, const Robot& robot) {
+  constexpr double kUnusedRisk = 1e-3;
+  log.rewind();
+  const Setting s = commission::settle(log, robot);
+  const Fit fit = commission::fit_log(log, s, commission::Part::everything, kUnusedRisk);
+  const auto shift = commission::effort_timing(log, s, fit);
+  return {.explained = !s.noise_complete || commission::within_declared(log, s, fit, std::nullopt).a_set,
+          .in_time = !shift || !commission::is_latency(*shift, s.survey.median_step)};
+}
+
 void check_delay(const HealthView& view, LogSource& log, const Setting& s, const Fit& fit,
                  std::vector<LogFinding>& out) {
   const Timing timing = timing_of(view, log, s, fit);
@@ -252,7 +250,8 @@ void check_delay(const HealthView& view, LogSource& log, const Setting& s, const
   if (shift && shift->delay > -kLateFrom * view.step && check_effort_filter(view, log, s, fit, out)) {
     return;
   }
-  if (shift && shift->delay < 0.0 && timing.likely && check_smoothing(view, s, fit, *shift, timing.refuses(), out)) {
+  if (shift && shift->delay < 0.0 && timing.likely &&
+      check_smoothing(view, log, s, fit, *shift, timing.refuses(), out)) {
     return;
   }
   if (!shift) {
@@ -264,7 +263,7 @@ void check_delay(const HealthView& view, LogSource& log, const Setting& s, const
   const double delay = shift->delay, steps = delay / view.step;
   const std::optional<TakenLag> lag = find_lag(view, log, s, fit, timing);
   const bool tried = is_taken(view, lag);
-  const bool taken = tried && explains(view, with(view.robot, *lag));
+  const bool taken = tried && (!s.noise_complete || read_as(log, with(view.robot, *lag)).explained);
   const bool matters = timing.likely || (std::abs(delay) > 3.0 * shift->standard_error &&
                                          shift->residual_ratio < 0.95 && std::abs(steps) > 0.25);
   const bool large = matters && std::abs(steps) > 0.75;

@@ -169,6 +169,14 @@ struct HealthView {
 /// Names of all columns of the joints' motion.
 [[nodiscard]] std::vector<std::string> motion_columns(const HealthView& view);
 
+/// What is left of a log that is read as another robot file says.
+struct OtherReading {
+  bool explained = true;  ///< declared errors leave parameters; true where none are declared
+  bool in_time = true;    ///< the efforts are not late or early by more than that file allows
+};
+/// Reads `log` as `robot` says. Costs a fit, and a feasible set where errors are declared.
+[[nodiscard]] OtherReading read_as(LogSource& log, const Robot& robot);
+
 /// Puts the stretches of rows that `flagged` marks into `finding`; marks less than `join` s apart are one stretch.
 void set_stretches(LogFinding& finding, const HealthView& view, const std::vector<bool>& flagged, double join);
 
@@ -199,8 +207,9 @@ void check_delay(const HealthView& view, LogSource& log, const commission::Setti
 /// Efforts that are early by `timing` because speeds passed through a low-pass filter, in this setting with its fit.
 /// `refused`: commissioning makes no model of them as they are. Returns whether that, or that it cannot be told from a
 /// delay, was said.
-bool check_smoothing(const HealthView& view, const commission::Setting& setting, const commission::Fit& fit,
-                     const commission::EffortTiming& timing, bool refused, std::vector<LogFinding>& findings);
+bool check_smoothing(const HealthView& view, LogSource& log, const commission::Setting& setting,
+                     const commission::Fit& fit, const commission::EffortTiming& timing, bool refused,
+                     std::vector<LogFinding>& findings);
 /// Rows of a second source among those of a first.
 void check_sources(const HealthView& view, std::vector<LogFinding>& findings);
 /// Whether the log is that of a differential drive: joints as the reader met them, turning by gyro or pose against the

@@ -35,7 +35,8 @@ def kind(reasons="", sensors=None, false="", possible=True, doubt=False, **robot
 
 class Log:
     """A log with honest sensors, which a kind then changes: `columns` (arrays by name), `file` (the robot file),
-    `truth` (by parameter of model.json; a tuple: all of them; None: no model is right), how it is written."""
+    `truth` (by parameter of model.json; a tuple: all of them; None: no model is right), `sizes` (how large what is odd
+    is, by dimension), how it is written."""
 
     def __init__(self, robot, true, g, motion="", counts=0, declared=None, gyro=None, pose=None, nominal=None,
                  bag=None):
@@ -78,6 +79,7 @@ class Log:
         if nominal:
             self.file["nominal"] = {name: self.truth[name] * g.uniform(0.85, 1.15) for name in basic}
         self.dialect, self.joints, self.unequal, self.own = world.Dialect(), ["left", "right"], False, None
+        self.sizes = {"rate, Hz": robot.rate}
 
     def sense(self, name, values):
         """Sets a column to `values` as its sensor gives them: counted, or with noise within the bound."""
@@ -93,6 +95,7 @@ class Log:
 
     def late(self, names, delay):
         """Senses columns `delay` s late."""
+        self.sizes["lag, steps"] = delay * self.robot.rate
         at = np.floor((self.columns["t"] - delay) * self.robot.rate * self.robot.fine + 1e-6).astype(int).clip(0)
         for name in names:
             self.sense(name, self.true[name][at])
@@ -100,6 +103,7 @@ class Log:
     def smooth(self, names, tau):
         """Passes columns through a low-pass of the driver: of what is logged, or of what is 1 kHz and faster."""
         logged = self.g.uniform() < 0.5
+        self.sizes["time constant, steps"] = tau * self.robot.rate
         for name in names:
             if logged:
                 self.columns[name] = world.low_pass(self.columns[name], self.step, tau)
@@ -108,6 +112,7 @@ class Log:
 
     def scatter(self, deviation):
         """Stamps of even samples with Gaussian errors of `deviation` s."""
+        self.sizes["jitter, % of a step"] = 100 * deviation * self.robot.rate
         t = self.columns["t"]
         self.columns["t"] = np.maximum.accumulate(t + deviation * self.g.normal(size=len(t)))
 
@@ -117,6 +122,7 @@ class Log:
 
     def lose(self, share, longest=1):
         """Loses a share of the rows, up to `longest` in a row."""
+        self.sizes["lost rows, %"] = 100 * share
         lost = np.zeros(len(self.columns["t"]), dtype=bool)
         while lost.mean() < share:
             at = self.g.integers(1, len(lost) - longest)
@@ -244,6 +250,7 @@ def smoothed_speeds(log):
 def averaged_speeds(log):
     """Speeds that are means of the last two to ten samples."""
     many = int(log.g.integers(2, 11))
+    log.sizes["samples averaged"] = many
     for name in log.of("omega"):
         x = np.concatenate([np.full(many - 1, log.columns[name][0]), log.columns[name]])
         log.columns[name] = np.convolve(x, np.full(many, 1.0 / many), "valid")
@@ -253,6 +260,7 @@ def averaged_speeds(log):
 def differenced(log):
     """Speeds are differences of 20 to 32,768 counts a turn, stamped at their end."""
     counts = int(log.g.choice(COUNTS))
+    log.sizes["counts a turn"] = counts
     if log.declared:
         log.file["encoder_counts_per_turn"] = counts
         log.file["noise"].pop("wheel_speed")
@@ -266,6 +274,7 @@ def differenced(log):
 def coarse_angles(log):
     """Angles of 20 to 32,768 counts a turn."""
     log.counts = int(log.g.choice(COUNTS))
+    log.sizes["counts a turn"] = log.counts
     for name in log.of("phi"):
         log.sense(name, log.true[name][log.rows])
     if "encoder_counts_per_turn" in log.file:
@@ -385,6 +394,7 @@ def smoothed_effort(log):
 def held_effort(log):
     """Efforts that are new in every second to eighth row only."""
     many = int(log.g.integers(2, 9))
+    log.sizes["rows held"] = many
     for name in log.of("tau"):
         log.columns[name] = log.columns[name][np.arange(len(log.columns["t"])) // many * many]
 

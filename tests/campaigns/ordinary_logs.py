@@ -18,8 +18,9 @@ Each log is given to `doctor` and `commission`, and the truth is known. By kind 
     could         share of logs without a model, where a right one is possible
     accounts      logs of which doctor and commission (with --same-account identify, gap, try and Python, too) disagree
 
-and lists every wrong one with the command that makes it again (--keep DIR keeps log, robot file and answers). Ends with
-1 where there is a wrong one, with 77 without numpy. Everything random follows from kind, seed and --seconds.
+and lists every wrong one with the command that makes it again (--keep DIR keeps log, robot file and answers). A second
+table has the same for the quarters of a kind's logs by rate, and by how large what is odd about them is. Ends with 1
+where there is a wrong one, with 77 without numpy. Everything random follows from kind, seed and --seconds.
 """
 
 import argparse
@@ -185,12 +186,12 @@ def examine(options, of, seed, log):
                  "code": commission.code, "commission": commission.json, "refusal": commission.text}, indent=1))
         return {"kind": of.name, "seed": seed, "verdict": verdict, "why": why,
                 "warrant": commission.json.get("warrant"), "width": width, "accounts": differ, "doctor": says,
-                "rate": log.robot.rate, "hold": log.robot.hold,
+                "sizes": log.sizes, "hold": log.robot.hold,
                 "motion": log.motion, "declared": log.declared, "coulomb": log.robot.coulomb, "bag": log.bag}
 
 
 def row(name, records, possible):
-    """A line of the table."""
+    """A line of a table."""
     count = lambda verdict: sum(r["verdict"] == verdict for r in records)
     right = [r for r in records if r["verdict"] == "right"]
     widths = [r["width"]["mass"] for r in right if "mass" in r["width"]]
@@ -202,13 +203,33 @@ def row(name, records, possible):
     return "| " + " | ".join(map(str, cells)) + " |"
 
 
+HEAD = "logs, right, guaranteed, wide, true reason, other, wrong, could, accounts, width of mass".split(", ")
+
+
+def head(first):
+    """The first lines of a table."""
+    return [f"| {' | '.join([first, *HEAD])} |", "|---" * (len(HEAD) + 1) + "|"]
+
+
+def quarters(name, records):
+    """Lines of a table over how large what is odd about a kind is, and over rates: each a quarter of its logs."""
+    lines = []
+    for dimension in dict.fromkeys(d for r in records for d in r["sizes"]):
+        of = sorted((r for r in records if dimension in r["sizes"]), key=lambda r: r["sizes"][dimension])
+        for quarter in range(4 if len(of) >= 8 else 0):
+            some = of[len(of) * quarter // 4:len(of) * (quarter + 1) // 4]
+            low, high = (some[k]["sizes"][dimension] for k in (0, -1))
+            lines.append(row(f"{name}: {dimension}: {low:.3g} to {high:.3g}", some, KINDS[name].possible))
+    return lines
+
+
 def report(records):
-    """The table of all records, and every wrong one."""
-    head = "kind, logs, right, guaranteed, wide, true reason, other, wrong, could, accounts, width of mass".split(", ")
-    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
-    for name in dict.fromkeys(r["kind"] for r in records):
-        lines.append(row(name, [r for r in records if r["kind"] == name], KINDS[name].possible))
-    lines.append(row("all", records, False))
+    """The tables of all records, by kind and by size, and every wrong one."""
+    by_kind = {name: [r for r in records if r["kind"] == name] for name in dict.fromkeys(r["kind"] for r in records)}
+    lines = head("kind") + [row(name, some, KINDS[name].possible) for name, some in by_kind.items()]
+    lines += [row("all", records, False)]
+    sizes = [line for name, some in by_kind.items() if KINDS[name].possible for line in quarters(name, some)]
+    lines += ["", *head("kind: size"), *sizes] if sizes else []
     for r in records:
         if r["verdict"] == "wrong" or r["accounts"]:
             wrong = r["verdict"] == "wrong"
