@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "commission/evidence.hpp"
 #include "commission/fit.hpp"
 #include "commission/noise_budget.hpp"
 #include "commission/pose_origin.hpp"
@@ -268,6 +269,15 @@ std::optional<OdometryFit> fit_rows(const Frame& s, Part part, double risk) {
   return fit;
 }
 
+// The shift between pose or gyro and wheels that the beginning of the log tells.
+std::optional<PoseTiming> told_timing(const Frame& s, const OdometryFit& fit) {
+  constexpr std::size_t kRows = 60000;
+  filter::OdometryRows stream = make_rows(s, s.declared);
+  const auto timing = pose_timing(first_rows(stream, kRows), fit.squares.estimate, weights_of(fit.residuals),
+                                  s.measurement.nominal_step);
+  return timing && timing->told(s.measurement.nominal_step) ? timing : std::nullopt;
+}
+
 // A robot whose wheels slip in every turn (skid steer) is far from its geometry: sides of the prior box that least
 // squares leaves are moved outward until they hold it, with the same share to spare. Returns the names of these
 // parameters.
@@ -376,7 +386,14 @@ std::string message_of(const Frame& s, const KinematicCommissioning& r) {
                                                          : "the gyro",
                                  s.window);
   const auto estimated = std::ranges::count(r.noise, core::NoiseOrigin::estimated, &OutputNoise::origin);
-  if (r.declared_too_small) {
+  if (r.shift) {
+    text += fmt::format(
+        "; by the declared noise it comes {:.2g} ± {:.1g} s {} them (95 %; speeds stamped at the end of their "
+        "interval, "
+        "clocks that differ and wheels that slip with the acceleration look like that), so the bounds are extrapolated "
+        "from the residuals of this log",
+        std::abs(r.shift->delay), 2.0 * r.shift->standard_error, r.shift->delay > 0.0 ? "after" : "before");
+  } else if (r.declared_too_small) {
     text +=
         "; no wheel radii explain the pose within the declared noise (wheels that slip in turns, a pose beside the "
         "axle or late would do that), so the bounds are extrapolated from the residuals of this log";
@@ -457,10 +474,14 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
   }
   result.far_from_nominal = widen(s, *fit, options.radius_share);
   result.prior = s.prior;
-  result.noise = output_noise(s, *fit);
-  BoundedSet bounded = bounded_set(s, Part::everything, *fit, result.noise);
   const bool any_declared = std::ranges::find(s.is_declared, true) != s.is_declared.end();
-  if (bounded.set.status == FeasibleSet::Status::empty && any_declared) {
+  result.shift = any_declared ? told_timing(s, *fit) : std::nullopt;
+  BoundedSet bounded;
+  if (!result.shift) {
+    result.noise = output_noise(s, *fit);
+    bounded = bounded_set(s, Part::everything, *fit, result.noise);
+  }
+  if (result.shift || (any_declared && bounded.set.status == FeasibleSet::Status::empty)) {
     result.declared_too_small = true;
     s.declared = {};
     s.is_declared.assign(s.is_declared.size(), false);

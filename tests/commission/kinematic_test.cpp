@@ -101,6 +101,31 @@ TEST(Kinematic, SaysWhenTheDeclaredNoiseIsTooSmall) {
   }
 }
 
+// Every interval of a model that calls itself explained by declared noise must hold the truth, whatever the lag is.
+TEST(Kinematic, APoseAtAnotherTimeThanTheWheelsTakesTheDeclaredNoiseAway) {
+  for (const double lag : {-0.12, -0.05, 0.05, 0.12}) {
+    const Scenario s = posed_drive(11);
+    LogTable log = sim::simulate(s);
+    const double step = log.t[1] - log.t[0];
+    const auto shift = static_cast<std::ptrdiff_t>(std::lround(lag / step));
+    for (const char* name : {"x", "y", "theta"}) {
+      const std::vector<double> on_time = log.column(name);
+      std::vector<double>& moved = log.column(name);
+      for (std::size_t k = 0; k < moved.size(); ++k) {
+        moved[k] = on_time[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(
+            static_cast<std::ptrdiff_t>(k) - shift, 0, static_cast<std::ptrdiff_t>(moved.size()) - 1))];
+      }
+    }
+    TableSource source(log);
+    const KinematicCommissioning result = commission_robot(source, s.robot).kinematic;
+    ASSERT_EQ(result.status, Status::done) << result.message;
+    EXPECT_TRUE(result.declared_too_small);
+    ASSERT_TRUE(result.shift.has_value());
+    EXPECT_NEAR(result.shift->delay, lag, 0.3 * std::abs(lag));
+    EXPECT_THAT(result.message, HasSubstr(lag > 0.0 ? "s after them" : "s before them"));
+  }
+}
+
 TEST(Kinematic, IsAbsentWithoutAPose) {
   Scenario s = posed_drive(6);
   s.sensors.pose = false;
