@@ -68,7 +68,10 @@ double WheelAngle::follow(double time, double angle, bool predict) {
   const double moved = std::abs(step + turns * turn_);
   count_ = moved > 1e-9 && !broken_ ? std::min(count_, moved) : count_;
   turns_ += turns;
-  if (longest_lead * seconds >= span_) {
+  if (broken_) {  // where it leads is not known
+    rate_ = std::numeric_limits<double>::quiet_NaN();
+    span_ = 0.0;
+  } else if (longest_lead * seconds >= span_) {
     rate_ = (step + turns * turn_) / seconds;
     span_ = seconds;
   }

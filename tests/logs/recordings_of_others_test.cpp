@@ -130,6 +130,28 @@ TEST_F(RecordingsOfOthers, LostMessagesAndLongStepsDoNotEndUnwrapping) {
   }
 }
 
+// The first jump of a counter at 2^16 counts says nothing of the steps behind it, which are as large as those before.
+TEST_F(RecordingsOfOthers, TheFirstJumpOfACounterIsNoStepOfTheWheel) {
+  for (const double counts : {1024.0, 8192.0, 32768.0}) {
+    const double range = 65536.0 / counts * turn, rate = 5.0;
+    WheelAngle angle;
+    double before = 0.0;
+    int broken = 0;
+    const int rows = static_cast<int>(3.5 * range / rate / 0.01);
+    for (int k = 0; k < rows; ++k) {
+      const double t = 0.01 * k, counted = std::floor(rate * t * counts / turn) * turn / counts;
+      const double raw = std::fmod(counted + 0.3 * range, range) - 0.5 * range;
+      const double value = k == 0 ? angle.begin(t, raw) : angle.follow(t, raw);
+      broken += angle.broken() ? 1 : 0;
+      if (k > 0 && !angle.broken()) {
+        ASSERT_NEAR(value - before, rate * 0.01, 1.01 * turn / counts) << counts << " counts, row " << k;
+      }
+      before = value;
+    }
+    EXPECT_EQ(broken, 1) << counts << " counts";
+  }
+}
+
 TEST_F(RecordingsOfOthers, AHeadingOfAnOwnTypeGoesTheShortWayRound) {
   BagWriter bag(path("a.mcap"));
   const std::size_t wheels = add(bag, "/joint_states", RosJointState::type),
