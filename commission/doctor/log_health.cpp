@@ -568,6 +568,26 @@ void drop_consequences(const HealthView& view, const ReaderCounts& reader, LogHe
   });
 }
 
+// Wheels that never go backwards although something else says that they do: their sensors may see no direction.
+void tell_never_backwards(const HealthView& view, LogHealth& health) {
+  const auto never = [](const JointView& joint) {
+    return joint.angle != nullptr ? std::ranges::is_sorted(*joint.angle)
+                                  : joint.speed != nullptr && std::ranges::min(*joint.speed) >= 0.0;
+  };
+  if (view.joints.empty() || !std::ranges::all_of(view.joints, never)) {
+    return;
+  }
+  for (LogFinding& f : health.findings) {
+    if (f.severity == FindingSeverity::fatal &&
+        (f.id == "motion.not_differential_drive" || f.id == "units.effort_sign" || f.id == "units.odometry")) {
+      f.sentence +=
+          fmt::format(" Yet no wheel ever turns back: where the robot did, {} a sensor without a direction of its own.",
+                      view.joints.front().angle != nullptr ? "the angles are those of" : "the speeds are those of");
+      f.next += " Count both channels of an encoder, or record a drive in which no wheel reverses.";
+    }
+  }
+}
+
 }  // namespace
 
 LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, const ReaderCounts& reader,
@@ -617,6 +637,7 @@ LogHealth examine(const LogTable& stamped, const std::optional<Robot>& robot, co
         [&] { reaches_bounds = !check_direction(view, of_motion) && check_motion(view, of_motion); });
     std::ranges::move(of_motion, std::back_inserter(health.findings));
     drop_consequences(view, reader, health);
+    tell_never_backwards(view, health);
     const LogFinding* smoothed = health.find("signals.speed_filter");
     if (smoothed != nullptr && smoothed->speed_filter) {  // that is why the wheels are later than a gyro
       std::erase_if(health.findings, [](const LogFinding& f) { return f.id == "time.gyro_delay"; });
