@@ -212,8 +212,10 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
       "the robot file",
       late - 5.0 * timing.standard_error, late + 5.0 * timing.standard_error);
   if (timing.delay < 0.0 && s.measurement.hold == Hold::first_order && half < kManyStepsOff) {
-    return "that is half a step: speeds that are differenced backwards are stamped half a step late (stamp them in the "
-           "middle of their interval, or log angles), and efforts that are held commands want `hold: zero_order`; " +
+    return "that is half a step: speeds that are differenced backwards, or averaged over two samples, are stamped half "
+           "a "
+           "step late (stamp them in the middle of their interval, or log angles), and efforts that are held commands "
+           "want `hold: zero_order`; " +
            declare;
   }
   if (timing.delay > 0.0 && s.measurement.hold == Hold::zero_order && half < kManyStepsOff) {
@@ -516,14 +518,16 @@ ShiftWeight weigh_shift(const EffortTiming& timing, const Explained& explained, 
   constexpr double kMuchExplained = 0.75;  // of the residual: more is left where errors merely look like a shift
   const Eigen::Index last = explained.noise.size() - 1;
   const auto beyond = [&](double errors) {
-    return timing.beyond() - std::max(errors * timing.standard_error, kLeastShift * step) - explained.in_doubt[last];
+    return timing.beyond() - std::max(errors * timing.standard_error, kLeastShift * step);
   };
-  if (const double by = beyond(certain(timing.freedom)); is_latency(timing, step) && by > 0.0) {
+  if (const double by = beyond(certain(timing.freedom)) - explained.in_doubt[last];
+      is_latency(timing, step) && by > 0.0) {
     return by > explained.noise[last] || timing.residual_ratio < kMuchExplained ? ShiftWeight::told
                                                                                 : ShiftWeight::doubted;
   }
-  return may_be_latency(timing, step) && beyond(errors_at(kRiskOfDoubt, timing.freedom)) > 0.0 ? ShiftWeight::doubted
-                                                                                               : ShiftWeight::explained;
+  const double by = beyond(errors_at(kRiskOfDoubt, timing.freedom));
+  const bool doubted = by > explained.shift_by_chance || (by > 0.0 && timing.residual_ratio < kMuchExplained);
+  return may_be_latency(timing, step) && doubted ? ShiftWeight::doubted : ShiftWeight::explained;
 }
 
 WithinDeclared within_declared(LogSource& log, const Setting& s, const Fit& fit,

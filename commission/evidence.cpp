@@ -2,6 +2,7 @@
 #include "commission/evidence.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "commission/noise_budget.hpp"
@@ -26,6 +27,24 @@ Eigen::VectorXd shift_column(const RegressionBlock& rows, const Eigen::VectorXd&
     column.segment(at, n) = (torque.segment(at - n, n) - torque.segment(at + n, n)) / (rows.t[k + 1] - rows.t[k - 1]);
   }
   return column;
+}
+
+// Root of the sum of squares over stretches of `length` s of Σ|weights|·errors in each: the standard deviation of a sum
+// whose stretches have signs of their own.
+double by_stretches(const RegressionBlock& rows, const Eigen::VectorXd& weights, const Eigen::VectorXd& errors,
+                    double length) {
+  const auto n = static_cast<Eigen::Index>(rows.outputs);
+  double square = 0.0, sum = 0.0, begun = rows.t.front();
+  for (std::size_t k = 0; k < rows.instants(); ++k) {
+    if (std::abs(rows.t[k] - begun) > length) {
+      square += sum * sum;
+      sum = 0.0;
+      begun = rows.t[k];
+    }
+    const auto at = static_cast<Eigen::Index>(k) * n;
+    sum += weights.segment(at, n).cwiseAbs().dot(errors.segment(at, n));
+  }
+  return std::sqrt(square + sum * sum);
 }
 
 }  // namespace
@@ -118,9 +137,12 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   Eigen::VectorXd in_doubt = g.cwiseAbs().transpose() * doubt;
   const bool held_between =
       s.measurement.hold == Hold::zero_order && s.measurement.changes == model::EffortChanges::between;
-  if (held_between || s.measurement.delay != Interval{}) {
-    in_doubt[fitted] = g.col(fitted).cwiseAbs().dot(of_motion);  // EffortTiming::allowed has what efforts do
-  }
+  // EffortTiming::allowed has what efforts do.
+  const Eigen::VectorXd& of_shift = held_between || s.measurement.delay != Interval{} ? of_motion : doubt;
+  in_doubt[fitted] = g.col(fitted).cwiseAbs().dot(of_shift);
+  constexpr double kNearlyAlways = 3.0;  // standard deviations
+  result.shift_by_chance = std::min(
+      in_doubt[fitted], kNearlyAlways * by_stretches(rows, g.col(fitted), of_shift, s.filter.settle / s.filter.beta));
   filter::ErrorInfluence influence(s.model, s.filter, s.measurement, noise_budget(s.robot, s.measurement).sensors,
                                    theta, fitted + 1);
   influence.add(rows, g);

@@ -184,8 +184,8 @@ EffortTiming shift_of(double errors, double left) {
 }
 
 TEST(EffortMoment, AShiftWeighsByWhatExplainsIt) {
-  const auto explained = [](double doubt, double noise) {
-    return Explained{Eigen::VectorXd::Constant(5, doubt), Eigen::VectorXd::Constant(5, noise)};
+  const auto explained = [](double doubt, double noise, double by_chance = 0.0) {
+    return Explained{Eigen::VectorXd::Constant(5, doubt), Eigen::VectorXd::Constant(5, noise), by_chance};
   };
   constexpr double kStep = 0.01;
   EXPECT_EQ(weigh_shift(shift_of(2.0, 0.99), explained(0.0, 0.0), kStep), ShiftWeight::explained);
@@ -193,7 +193,9 @@ TEST(EffortMoment, AShiftWeighsByWhatExplainsIt) {
   EXPECT_EQ(weigh_shift(shift_of(40.0, 0.95), explained(0.0, 0.0), kStep), ShiftWeight::told);
   EXPECT_EQ(weigh_shift(shift_of(40.0, 0.95), explained(0.0, 0.1), kStep), ShiftWeight::doubted);
   EXPECT_EQ(weigh_shift(shift_of(40.0, 0.5), explained(0.0, 0.1), kStep), ShiftWeight::told);
-  EXPECT_EQ(weigh_shift(shift_of(40.0, 0.5), explained(0.1, 0.0), kStep), ShiftWeight::explained);
+  EXPECT_EQ(weigh_shift(shift_of(40.0, 0.5), explained(0.1, 0.0), kStep), ShiftWeight::doubted);
+  EXPECT_EQ(weigh_shift(shift_of(40.0, 0.95), explained(0.1, 0.0, 0.1), kStep), ShiftWeight::explained);
+  EXPECT_EQ(weigh_shift(shift_of(40.0, 0.5), explained(0.1, 0.0, 0.1), kStep), ShiftWeight::doubted);
 }
 
 }  // namespace
