@@ -351,6 +351,7 @@ std::optional<SpeedSmoothing> speed_smoothing(LogSource& log, const Setting& s, 
     }
     out.told = found->told == Told::filter;
     out.delay = found->shift.fit.shape[0];
+    out.steps = out.delay / s.survey.median_step;
     for (std::size_t j = 0; j < s.model.p(); ++j) {
       if (fit.excitation[j].state == identify::Excitation::identified) {
         const auto at = static_cast<Eigen::Index>(j);
@@ -417,10 +418,14 @@ std::string late_speeds(const SpeedSmoothing& smoothing) {
   const std::string dry =
       smoothing.dry_friction ? "; the log shows dry friction too, whose sign does not pass through a filter" : "";
   if (!smoothing.told) {
+    constexpr double kAboutHalf = 0.15;
+    const bool half_a_step = std::abs(smoothing.steps - 0.5) < kAboutHalf;
     return fmt::format(
-        "the efforts come {:.3g} ms before the motion: the driver smooths the speeds, the actuators are slow to "
+        "the efforts come {:.3g} ms before the motion: the driver smooths the speeds{}, the actuators are slow to "
         "follow, or clocks differ, which this log does not tell apart and which moves parameters by {:.2g} %{}",
-        1e3 * smoothing.delay, 100.0 * smoothing.differs, dry);
+        1e3 * smoothing.delay,
+        half_a_step ? " or takes them from differences of angles, stamped at their end (that is half a step)" : "",
+        100.0 * smoothing.differs, dry);
   }
   const std::string time =
       fmt::format("{:.3g} ± {:.1g} ms (95 %)", 1e3 * smoothing.time, 2e3 * smoothing.standard_error);

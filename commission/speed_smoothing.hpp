@@ -24,6 +24,7 @@ struct SpeedSmoothing {
   double time = 0.0;            ///< s, best value
   double standard_error = 0.0;  ///< s, valid under autocorrelated residuals
   double delay = 0.0;           ///< s, the constant shift that explains the log best instead (> 0: efforts are early)
+  double steps = 0.0;           ///< `delay` in steps of the log
   double differs = 0.0;         ///< largest share by which a parameter is another with the shift
   bool told = false;  ///< the log tells the filter from any shift, at a risk of 1e-4; else a mean stands for both
   bool gyro_agrees = false;   ///< the wheels' yaw rate follows the gyro as late as the efforts
