@@ -5,6 +5,7 @@
 #include <cmath>
 #include <exception>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <memory>
 
@@ -235,11 +236,24 @@ struct HeldOut {
   double polytope_over_box = 1.0;
 };
 
-HeldOut try_held_out(LogSource& log, const Setting& s, const CommissionOptions& options) {
+// Factors on the estimated noise bounds, one for each output; empty: none.
+using Raises = std::vector<double>;
+
+std::vector<OutputNoise> raised_noise(const Setting& s, const Fit& fit, const CommissionOptions& options,
+                                      const Raises& raises) {
+  std::vector<OutputNoise> noise = output_noise(s, fit, options.extrapolation);
+  for (std::size_t i = 0; i < raises.size(); ++i) {
+    noise[i].bound *= raises[i];
+    noise[i].learning *= raises[i];
+  }
+  return noise;
+}
+
+HeldOut try_held_out(LogSource& log, const Setting& s, const CommissionOptions& options, const Raises& raises) {
   HeldOut held_out;
   const Fit trained = fit_log(log, s, Part::training, options.extrapolation.risk);
   std::vector<std::string> unused;
-  std::vector<OutputNoise> noise = output_noise(s, trained, options.extrapolation);
+  std::vector<OutputNoise> noise = raised_noise(s, trained, options, raises);
   const RefinedSet learnt =
       bounded_set(log, s, Part::training, trained, options.extrapolation.risk, noise, options.outliers, unused);
   const FeasibleSet& set = learnt.result.set;
@@ -270,7 +284,8 @@ struct Learnt {
 };
 
 // Fills in noise, notes and the kinematic residual of `result`, too.
-Learnt learn_beside(LogSource& log, const Setting& s, const CommissionOptions& options, Commissioning& result) {
+Learnt learn_beside(LogSource& log, const Setting& s, const CommissionOptions& options, const Raises& raises,
+                    Commissioning& result) {
   const std::unique_ptr<LogSource> other = options.threads > 1 ? log.another_walk() : nullptr;
   Learnt learnt;
   core::both(
@@ -283,7 +298,7 @@ Learnt learn_beside(LogSource& log, const Setting& s, const CommissionOptions& o
         }
         tell(options, "validating on held-out blocks", 0.3);
         try {
-          learnt.held_out = try_held_out(log, s, options);
+          learnt.held_out = try_held_out(log, s, options, raises);
         } catch (...) {
           learnt.held_out_failed = std::current_exception();  // asked for where a model came out
         }
@@ -301,7 +316,7 @@ Learnt learn_beside(LogSource& log, const Setting& s, const CommissionOptions& o
         tell_alone("looking for contradictions", 0.35);
         learnt.signals = contradictions_in_log(walk, s, learnt.fit);
         tell_alone("bounding", 0.4);
-        result.noise = output_noise(s, learnt.fit, options.extrapolation);
+        result.noise = raised_noise(s, learnt.fit, options, raises);
         learnt.bounded = bounded_set(walk, s, Part::everything, learnt.fit, options.extrapolation.risk, result.noise,
                                      options.outliers, result.notes);
       });
@@ -598,7 +613,44 @@ std::vector<std::string> remedies(LogSource& log, const Setting& s, const Commis
   return list;
 }
 
-Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionOptions& options) {
+// What the noise bounds must be raised by for the driving that was held out to stay within its thresholds, and what was
+// found of it: where a model with estimated noise is withdrawn for that alone. Nothing where the noise would have to be
+// another one than that of the rest of the log.
+struct FailedTrial {
+  Raises raises;
+  std::vector<LogContradiction> found;
+};
+
+FailedTrial failed_trial(const Commissioning& result) {
+  constexpr double kMostRaised = 3.0;
+  constexpr double kSpare = 1.05;  // the set changes with its noise
+  FailedTrial trial;
+  for (const LogContradiction& c : result.contradictions) {
+    if (c.withdraws && c.kind != LogContradiction::Kind::held_out_outside) {
+      return {};
+    }
+    if (c.withdraws) {
+      trial.found.push_back(c);
+    }
+  }
+  for (std::size_t i = 0; i < result.validation.size() && !trial.found.empty(); ++i) {
+    const double used = result.validation[i].utilisation;
+    if (result.noise[i].origin != core::NoiseOrigin::estimated || used > kMostRaised) {
+      return {};
+    }
+    trial.raises.push_back(used > 1.0 ? kSpare * used : 1.0);
+  }
+  for (LogContradiction& c : trial.found) {
+    const auto output = std::ranges::find(result.model.model.outputs, c.subject) - result.model.model.outputs.begin();
+    const double by = trial.raises[static_cast<std::size_t>(output)];
+    c.withdraws = false;
+    c.sentence += fmt::format(": its noise bound was raised by {:.2g}, with which they do not", by);
+  }
+  return trial;
+}
+
+Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionOptions& options,
+                           const FailedTrial& trial) {
   Commissioning result;
   result.noise_mode = options.noise_mode;
   const Setting s = settle(log, robot,
@@ -613,7 +665,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   result.folds = s.folds;
   result.model = described_model(s, options.persistence);
 
-  Learnt learnt = learn_beside(log, s, options, result);
+  Learnt learnt = learn_beside(log, s, options, trial.raises, result);
   result.model.kinematic = result.kinematic.model;
   const Fit& fit = learnt.fit;
   RefinedSet& bounded = learnt.bounded;
@@ -669,12 +721,13 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   if (!learnt.held_out) {
     tell(options, "validating on held-out blocks", 0.7);
   }
-  const HeldOut held_out = learnt.held_out ? *learnt.held_out : try_held_out(log, s, options);
+  const HeldOut held_out = learnt.held_out ? *learnt.held_out : try_held_out(log, s, options, trial.raises);
   result.validation = held_out.validation;
   result.polytope_over_box = held_out.polytope_over_box;
   for (LogContradiction& found : contradictions_in_result(result, s, bounded.raised)) {
     result.contradictions.push_back(std::move(found));
   }
+  std::ranges::copy(trial.found, std::back_inserter(result.contradictions));
   weigh_efforts(log, s, result.row_errors, result.feasible.hull, result.contradictions);
   if (wants_weighing(result, s)) {
     weigh_contradictions(result, s, fit, learnt.signals.timing,
@@ -705,7 +758,13 @@ KinematicCommissionOptions kinematic_options(const Robot& robot, const Commissio
 }
 
 Commissioning commission_robot(LogSource& log, const Robot& robot, const CommissionOptions& options) {
-  Commissioning result = commissioned(log, robot, options);
+  Commissioning result = commissioned(log, robot, options, {});
+  if (const FailedTrial trial = failed_trial(result); !trial.raises.empty()) {
+    Commissioning raised = commissioned(log, robot, options, trial);
+    if (!withdrawn(raised)) {
+      result = std::move(raised);
+    }
+  }
   settle_warrants(result);
   if (options.at_risk != CommissionOptions::AtRisk::nothing) {
     const AtRiskOptions at_risk{.reach = options.at_risk == CommissionOptions::AtRisk::reach,
