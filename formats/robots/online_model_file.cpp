@@ -88,7 +88,7 @@ filter::SignalErrors read_errors(const JsonPlace& place, const Model& model) {
   return errors;
 }
 
-filter::OdometryMeasurement read_odometry(const JsonPlace& place) {
+filter::OdometryMeasurement read_odometry(const JsonPlace& place, const Robot& robot) {
   filter::OdometryMeasurement m;
   m.motion = files::value_of(kMotionWords, place.at("motion"));
   m.motion_columns = place.at("motion_columns").texts();
@@ -98,6 +98,9 @@ filter::OdometryMeasurement read_odometry(const JsonPlace& place) {
   m.held_pose = place.at("held_pose").boolean();
   m.count = bound_at(place.at("count"));
   m.nominal_step = bound_at(place.at("nominal_step"));
+  if (m.motion == MotionKind::speed) {
+    m.cut = robot.speed_cut;
+  }
   return m;
 }
 
@@ -325,12 +328,12 @@ JsonPlace model_root(const Json& json, const std::string& file) {
   return root;
 }
 
-std::optional<detector::KinematicModel> kinematic_from_json(const JsonPlace& place) {
+std::optional<detector::KinematicModel> kinematic_from_json(const JsonPlace& place, const Robot& robot) {
   if (!place.has("detector")) {
     return std::nullopt;
   }
   detector::KinematicModel model;
-  model.measurement = read_odometry(place.at("measurement"));
+  model.measurement = read_odometry(place.at("measurement"), robot);
   model.window = place.at("window").number();
   model.warrant = kinematic_warrant(place);
   const std::size_t p = model.measurement.parameters().size(), n = model.measurement.outputs().size();
@@ -375,7 +378,7 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
   model.persistence = persistence_at(detector.at("persistence"));
   take_set(root.at("feasible_set"), p, model.facets, model.box);
   if (root.has("kinematic")) {
-    model.kinematic = kinematic_from_json(root.at("kinematic"));
+    model.kinematic = kinematic_from_json(root.at("kinematic"), model.robot);
   }
   if (root.has("at_risk")) {
     model.at_risk = risk_at(root.at("at_risk"), model.model);

@@ -113,10 +113,7 @@ void ElementFilter::read(double t, std::span<const double> sample) {
   for (Eigen::Index j = 0; j < now.joint.size(); ++j) {
     const double value = sample[static_cast<std::size_t>(j)];
     now.joint[j] = measurement_.count > 0.0 ? std::round(value / measurement_.count) * measurement_.count : value;
-    if (measurement_.cut) {
-      const double half = 0.5 * measurement_.cut->unit;
-      now.joint[j] += measurement_.cut->down ? half : std::abs(value) < half ? 0.0 : std::copysign(half, value);
-    }
+    now.joint[j] = uncut(now.joint[j], measurement_.cut);
   }
   now.heading = measurement_.heading_column.empty() ? 0.0 : sample.back();
   read_effort(now, sample);

@@ -172,4 +172,12 @@ Measurement find_measurement(LogSource& log, const Robot& robot, const Model& mo
   return m;
 }
 
+double uncut(double speed, const std::optional<model::SpeedCut>& cut) {
+  if (!cut) {
+    return speed;
+  }
+  const double half = 0.5 * cut->unit;
+  return speed + (cut->down ? half : std::abs(speed) < half ? 0.0 : std::copysign(half, speed));
+}
+
 }  // namespace wheelwright::filter

@@ -82,6 +82,10 @@ struct Measurement {
   [[nodiscard]] std::vector<std::string> columns() const;
 };
 
+/// `speed` with half of the unit given back that it was cut off by; as it is where there is no `cut`, and at 0 between two
+/// signs.
+[[nodiscard]] double uncut(double speed, const std::optional<model::SpeedCut>& cut);
+
 /// Finds how `log` measures `robot`: angles where the log has them, else speeds; for order 2 and speed_source automatic
 /// the log is searched for count-differenced speeds (encoder.hpp). What is merely found never replaces what is
 /// declared: where the robot file bounds the noise of the wheel speeds by half of the quantum found or more, and

@@ -143,12 +143,13 @@ bool OdometryFilter::read(double t, std::span<const double> sample) {
   const double h = t - sample_time_;
   std::size_t next = 2;
   for (std::size_t w = 0; w < 2; ++w) {
+    const double motion = uncut(sample[w], measurement_.cut);
     if (measurement_.motion == MotionKind::angle) {
-      now_.wheels[w].measured = sample[w];
+      now_.wheels[w].measured = motion;
     } else if (started_) {
-      now_.wheels[w].angle.add(0.5 * h * (speed_[w] + sample[w]));
+      now_.wheels[w].angle.add(0.5 * h * (speed_[w] + motion));
     }
-    speed_[w] = sample[w];
+    speed_[w] = motion;
   }
   const double x = measurement_.position ? sample[next++] : 0.0;
   const double y = measurement_.position ? sample[next++] : 0.0;
@@ -362,10 +363,12 @@ std::optional<OdometryMeasurement> find_odometry(LogSource& log, const Robot& ro
   m.motion = torque.motion;
   m.motion_columns = torque.motion_columns;
   m.count = torque.count;
+  m.cut = torque.cut;
   if (log.find(model.joints[0].angle) && log.find(model.joints[1].angle)) {
     m.motion = MotionKind::angle;
     m.motion_columns = {model.joints[0].angle, model.joints[1].angle};
     m.count = 0.0;
+    m.cut.reset();
   }
   m.held_pose = m.heading && is_held(log, m);
   return m;

@@ -25,6 +25,7 @@ struct OdometryMeasurement {
   bool held_pose = false;     ///< a slower sensor's pose is repeated: only rows with a new one count as poses
   double count = 0.0;         ///< mean_speed: speeds are whole multiples of this, rad/s (0: not rounded)
   double nominal_step = 0.0;  ///< median step of the log it was found on, s
+  std::optional<model::SpeedCut> cut{};  ///< speed: half of its unit is given back
 
   /// Columns in the order in which OdometryFilter wants a sample.
   [[nodiscard]] std::vector<std::string> columns() const;

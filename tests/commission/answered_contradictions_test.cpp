@@ -399,6 +399,51 @@ TEST(AnsweredContradiction, HeldOutRowsOutsideTheThresholdsAreTold) {
   EXPECT_FALSE(contradictions_in_result(result, setting, 1.0).at(0).withdraws);
 }
 
+// Some seconds of a block that is held out are noisier than all others: what is learnt of the others is raised, and only
+// a noise of another kind withdraws the model.
+TEST(AnsweredContradiction, LearntNoiseIsRaisedByWhatWasHeldOut) {
+  const Scenario s = learnt_drive(21);
+  const Eigen::VectorXd truth = sim::true_parameters(s, model::make_model(s.robot));
+  std::size_t raised = 0, withdrawn = 0;
+  for (const double times : {0.0, 0.02, 0.05, 0.1, 0.2, 0.5, 2.0}) {
+    LogTable table = simulate(s);
+    testing_support::Random random(5);
+    const double end = table.t.back();
+    std::vector<double>& efforts = table.column("tau_r");
+    double size = 0.0;
+    for (const double effort : efforts) {
+      size = std::max(size, std::abs(effort));
+    }
+    double slow = 0.0;
+    for (std::size_t k = 0; k < efforts.size(); ++k) {
+      slow += 0.1 * (random.symmetric() - slow);
+      const double share = table.t[k] / end;
+      efforts[k] += share > 0.84 && share < 0.88 ? times * size * slow : 0.0;  // of the ninth tenth, the last held out
+    }
+    TableSource log(table);
+    const Commissioning result = commission_robot(log, s.robot);
+    const auto told = std::ranges::find(result.contradictions, Kind::held_out_outside, &LogContradiction::kind);
+    if (!result.has_model()) {
+      ++withdrawn;
+      continue;
+    }
+    for (const OutputValidation& v : result.validation) {
+      EXPECT_LE(100 * v.outside, v.instants) << times;
+    }
+    for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+      const ParameterResult& p = result.parameters[j];
+      EXPECT_LE(p.lower, truth[static_cast<Eigen::Index>(j)]) << times << ' ' << p.parameter.name;
+      EXPECT_GE(p.upper, truth[static_cast<Eigen::Index>(j)]) << times << ' ' << p.parameter.name;
+    }
+    if (told != result.contradictions.end() && told->sentence.find("was raised by") != std::string::npos) {
+      EXPECT_FALSE(told->withdraws);
+      ++raised;
+    }
+  }
+  EXPECT_GT(raised, 0U);
+  EXPECT_GT(withdrawn, 0U);
+}
+
 // A straddle carrier, and a robot beyond the tool's own default, which has to be named.
 TEST(AnsweredContradiction, AHeavyRobotIsCommissionedAndTheDefaultPriorIsNamed) {
   for (const double factor : {2000.0, 2e5}) {

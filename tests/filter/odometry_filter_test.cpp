@@ -460,6 +460,38 @@ TEST(OdometryFilter, FindsWhatALogHas) {
   EXPECT_FALSE(with({"theta", "x", "y"})->held_pose);
 }
 
+// What a driver cuts off adds up: half of the unit in every second and of either wheel, in the direction of motion.
+TEST(OdometryFilter, SpeedsThatAreCutOffAreGivenBackHalfTheirUnit) {
+  constexpr double kUnit = 0.1, kWindow = 1.0;
+  for (const bool down : {false, true}) {
+    for (const double side : {1.0, -1.0}) {
+      OdometryMeasurement m = all_outputs(MotionKind::speed);
+      m.position = m.heading = false;
+      OdometryFilter as_logged(m, kWindow);
+      m.cut = model::SpeedCut{.unit = kUnit, .down = down};
+      OdometryFilter given_back(m, kWindow);
+      double turned = 0.0, worst = 0.0, least = 1.0;
+      std::vector<double> angles;
+      for (int k = 0; k < 500; ++k) {
+        const double speed = side * (3.0 + 1.7 * std::sin(0.07 * k) + 0.9 * std::sin(0.0311 * k));
+        const double cut = kUnit * (down ? std::floor(speed / kUnit) : std::trunc(speed / kUnit));
+        turned += k > 0 ? kStep * speed : 0.0;
+        angles.push_back(turned);
+        const std::array<double, 3> sample{cut, cut, 0.0};
+        const bool row = as_logged.step(kStep * k, sample);
+        ASSERT_EQ(given_back.step(kStep * k, sample), row);
+        if (row && k >= 100) {
+          const double truth = turned - angles[static_cast<std::size_t>(k) - 100];
+          worst = std::max(worst, std::abs(given_back.row().Y(0, 0) - truth));
+          least = std::min(least, std::abs(as_logged.row().Y(0, 0) - truth));
+        }
+      }
+      EXPECT_LT(worst, 0.25 * kUnit * kWindow);
+      EXPECT_GT(least, 0.3 * kUnit * kWindow);
+    }
+  }
+}
+
 TEST(OdometryFilter, SaysWhatIsWrong) {
   EXPECT_THROW(OdometryFilter(all_outputs(), 0.0), InvalidArgument);
   EXPECT_THROW(OdometryFilter(all_outputs(), 0.015), InvalidArgument);
