@@ -14,6 +14,7 @@
 #include "commission/contradictions.hpp"
 #include "commission/setting.hpp"
 #include "tests/support/drives.hpp"
+#include "tests/support/random.hpp"
 
 namespace wheelwright::commission::answered_contradictions_test {
 
