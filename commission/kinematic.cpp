@@ -2,10 +2,13 @@
 #include "commission/kinematic.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -14,11 +17,13 @@
 #include "commission/noise_budget.hpp"
 #include "commission/pose_origin.hpp"
 #include "commission/setting_rows.hpp"
+#include "commission/speed_unit.hpp"
 #include "core/check.hpp"
 #include "core/linear_algebra.hpp"
 #include "core/statistics.hpp"
 #include "detector/threshold.hpp"
 #include "identify/least_squares.hpp"
+#include "model/filter/encoder.hpp"
 #include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
@@ -437,11 +442,53 @@ void validate_held_out(const Frame& s, KinematicCommissioning& result) {
       detector::ThresholdRule(*set.polytope, best_guess(fit->squares.estimate, fit->excitation, *set.polytope)));
 }
 
-}  // namespace
+// Where speeds are whole multiples of a unit, and nothing says whether they were rounded or cut off: the latter.
+std::optional<model::SpeedCut> open_cut(LogSource& log, const Robot& robot, const filter::OdometryMeasurement& m) {
+  constexpr std::size_t kRows = 60000;
+  constexpr double kTop = 0.99;  // quantile
+  if (m.motion != MotionKind::speed || m.cut || robot.noise.wheel_speed.value) {
+    return std::nullopt;
+  }
+  std::array<std::vector<double>, 2> speeds;
+  const std::array<std::optional<std::size_t>, 2> columns = {log.find(m.motion_columns[0]),
+                                                             log.find(m.motion_columns[1])};
+  log.rewind();
+  for (LogBlock block; speeds[0].size() < kRows && log.next(block);) {
+    for (std::size_t wheel = 0; wheel < 2; ++wheel) {
+      std::ranges::copy(block.columns[*columns[wheel]], std::back_inserter(speeds[wheel]));
+    }
+  }
+  log.rewind();
+  double unit = 0.0;
+  for (const std::vector<double>& of_wheel : speeds) {
+    std::vector<double> sizes(of_wheel.size());
+    std::ranges::transform(of_wheel, sizes.begin(), [](double speed) { return std::abs(speed); });
+    const auto rank = static_cast<std::size_t>(kTop * static_cast<double>(sizes.size()));
+    const double top = sizes.empty() ? 0.0 : core::order_statistic(std::move(sizes), rank);
+    const double found = top > 0.0 ? unit_of_speeds(of_wheel, top) : 0.0;
+    if (found > kCoarseUnit * top && !filter::find_encoder(of_wheel, m.nominal_step)) {
+      unit = std::max(unit, found);
+    }
+  }
+  return unit > 0.0 ? std::optional(model::SpeedCut{.unit = unit}) : std::nullopt;
+}
 
-KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
-                                             const std::optional<filter::OdometryMeasurement>& measurement,
-                                             const Survey& survey, const KinematicCommissionOptions& options) {
+// `result` holds, beside its own, the intervals of `other`.
+void join_intervals(KinematicCommissioning& result, const KinematicCommissioning& other, double unit) {
+  for (std::size_t j = 0; j < std::min(result.parameters.size(), other.parameters.size()); ++j) {
+    KinematicParameter& p = result.parameters[j];
+    p.lower = std::min(p.lower, other.parameters[j].lower);
+    p.upper = std::max(p.upper, other.parameters[j].upper);
+  }
+  result.message += fmt::format(
+      "; speeds are in whole multiples of {:.4g} rad/s, rounded or cut off, which `speed_cut` in the robot file says: "
+      "the intervals hold both",
+      unit);
+}
+
+KinematicCommissioning commissioned_as(LogSource& log, const Robot& robot,
+                                       const std::optional<filter::OdometryMeasurement>& measurement,
+                                       const Survey& survey, const KinematicCommissionOptions& options) {
   KinematicCommissioning result;
   if (!measurement) {
     result.message = model::on_two_wheels(robot)
@@ -513,6 +560,23 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
   validate_held_out(s, result);
   result.message = message_of(s, result) + (origin.sentence.empty() ? "" : "; " + origin.sentence);
   log.rewind();
+  return result;
+}
+
+}  // namespace
+
+KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
+                                             const std::optional<filter::OdometryMeasurement>& measurement,
+                                             const Survey& survey, const KinematicCommissionOptions& options) {
+  KinematicCommissioning result = commissioned_as(log, robot, measurement, survey, options);
+  if (!result.model) {
+    return result;
+  }
+  if (const auto cut = open_cut(log, robot, *measurement)) {
+    filter::OdometryMeasurement as_cut = *measurement;
+    as_cut.cut = cut;
+    join_intervals(result, commissioned_as(log, robot, as_cut, survey, options), cut->unit);
+  }
   return result;
 }
 

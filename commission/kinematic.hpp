@@ -89,8 +89,10 @@ struct KinematicCommissionOptions {
 /// shows for what happens between samples; of the gyro, where its noise and `limits: acceleration` are declared.
 /// Elsewhere ē is extrapolated from the residuals. Where nothing explains the log within the declared noise (wheels slip
 /// a little in every turn, the pose's point is off the axle), or a pose or gyro is late or early against the wheels
-/// (PoseTiming::told), all outputs fall back to the extrapolated bound, and the message says so. Throws InvalidArgument
-/// for options out of range.
+/// (PoseTiming::told), all outputs fall back to the extrapolated bound, and the message says so. Of speeds in whole
+/// multiples of a unit (speed_unit.hpp) of which neither the robot file nor the log says that they were cut off, the
+/// intervals hold the parameters of both readings; the model is that of rounded ones. Throws InvalidArgument for options
+/// out of range.
 [[nodiscard]] KinematicCommissioning commission_kinematics(
     LogSource& log, const Robot& robot, const std::optional<filter::OdometryMeasurement>& measurement,
     const Survey& survey, const KinematicCommissionOptions& options = {});

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "commission/doctor/log_health.hpp"
+#include "commission/speed_unit.hpp"
 #include "core/statistics.hpp"
 #include "model/filter/encoder.hpp"
 
@@ -16,45 +17,8 @@ namespace wheelwright::doctor {
 namespace {
 
 constexpr double kRpmUnit = 2.0 * std::numbers::pi / 60.0;
-constexpr double kNearUnit = 0.1;           // of the unit: as far from its multiples are decimals that are printed
-constexpr double kSparse = 0.2;             // distinct values over rows, above which the column is not coarse
-constexpr double kMatters = 0.002;          // of the top speed: a finer unit is lost in everything else
-constexpr std::size_t kLeastRounded = 200;  // rows
-constexpr std::size_t kLeastPassages = 8;   // of zero
+constexpr std::size_t kLeastPassages = 8;  // of zero
 constexpr double kOffsetErrors = 4.0;
-
-// The unit of which all values are whole multiples, from the smallest upwards; 0 where there is none.
-double unit_of(const std::vector<double>& column, double top) {
-  std::vector<double> sizes;
-  for (const double v : column) {
-    if (v != 0.0) {
-      sizes.push_back(std::abs(v));
-    }
-  }
-  const std::size_t rows = sizes.size();
-  std::ranges::sort(sizes);
-  sizes.erase(std::unique(sizes.begin(), sizes.end(), [&](double a, double b) { return b - a < 1e-6 * top; }),
-              sizes.end());
-  if (rows < kLeastRounded || sizes.size() < 4 ||
-      static_cast<double>(sizes.size()) > kSparse * static_cast<double>(rows)) {
-    return 0.0;
-  }
-  double unit = sizes.front();
-  for (std::size_t k = 1; k < sizes.size(); ++k) {
-    unit = std::min(unit, sizes[k] - sizes[k - 1]);
-  }
-  double mn = 0.0, nn = 0.0;
-  for (const double m : sizes) {
-    const double n = std::round(m / unit);
-    if (n < 1.0 || std::abs(m / unit - n) > kNearUnit) {
-      return 0.0;
-    }
-    mn += m * n;
-    nn += n * n;
-    unit = mn / nn;
-  }
-  return unit;
-}
 
 std::string unit_words(double unit) {
   const auto decimal = [](double x) {
@@ -224,11 +188,11 @@ void check_rounding(const HealthView& view, std::vector<LogFinding>& findings) {
     if (joint.speed == nullptr || !(joint.top > 0.0) || view.robot.speed_cut) {
       continue;
     }
-    const double unit = unit_of(*joint.speed, joint.top);
+    const double unit = commission::unit_of_speeds(*joint.speed, joint.top);
     if (tell_whole_numbers(view, joint, unit, findings)) {
       return;
     }
-    if (!(unit > kMatters * joint.top) || filter::find_encoder(*joint.speed, view.step)) {
+    if (!(unit > commission::kCoarseUnit * joint.top) || filter::find_encoder(*joint.speed, view.step)) {
       continue;
     }
     if (view.robot.noise.wheel_speed.value.value_or(0.0) > 0.999 * unit) {

@@ -126,6 +126,39 @@ TEST(Kinematic, APoseAtAnotherTimeThanTheWheelsTakesTheDeclaredNoiseAway) {
   }
 }
 
+// Half a unit that is cut off in every second makes wheels look smaller in speed, and so larger in radius.
+TEST(Kinematic, IntervalsHoldTheTruthOfSpeedsThatAreRoundedOrCutOff) {
+  for (const bool cut_off : {false, true}) {
+    Scenario s = posed_drive(12, 30.0);
+    s.robot.noise = {};
+    s.robot.encoder_counts_per_turn.reset();
+    s.sensors.angles = false;
+    s.sensors.speeds = true;
+    LogTable log = sim::simulate(s);
+    double top = 0.0;
+    for (const char* name : {"omega_r", "omega_l"}) {
+      for (const double speed : log.column(name)) {
+        top = std::max(top, std::abs(speed));
+      }
+    }
+    const double unit = top / 60.0;
+    for (const char* name : {"omega_r", "omega_l"}) {
+      for (double& speed : log.column(name)) {
+        speed = unit * (cut_off ? std::trunc(speed / unit) : std::round(speed / unit));
+      }
+    }
+    TableSource source(log);
+    const KinematicCommissioning result = commission_robot(source, s.robot).kinematic;
+    ASSERT_EQ(result.status, Status::done) << result.message;
+    EXPECT_THAT(result.message, HasSubstr("rounded or cut off"));
+    const Eigen::VectorXd truth = true_kinematics(s.robot);
+    for (std::size_t j = 0; j < 4; ++j) {
+      EXPECT_LE(result.parameters[j].lower, truth[static_cast<Eigen::Index>(j)]) << result.parameters[j].name;
+      EXPECT_GE(result.parameters[j].upper, truth[static_cast<Eigen::Index>(j)]) << result.parameters[j].name;
+    }
+  }
+}
+
 TEST(Kinematic, IsAbsentWithoutAPose) {
   Scenario s = posed_drive(6);
   s.sensors.pose = false;
