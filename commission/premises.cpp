@@ -779,21 +779,34 @@ void test_friction(const Setting& s, const Widened& w, const PremiseMoments& mom
   }
 }
 
-std::optional<double> turning_over_driving(LogSource& log, const Setting& s, const RegressionMoments& moments) {
+// Of all instants, those with unknown signs of friction among them.
+std::optional<double> turning_over_driving(LogSource& log, const Setting& s) {
   if (!model::on_two_wheels(s.robot) || log.find("gyro_z") || log.find("theta")) {
     return std::nullopt;
   }
-  std::array<std::optional<double>, 2> square;  // Σ of the squared speed of each coordinate
+  std::array<const Term*, 2> speeds{};  // of each coordinate
   for (const Term& term : s.model.terms) {
-    if (term.kind == Term::Kind::speed && term.coordinate < square.size() && term.scale != 0.0) {
-      const auto at = static_cast<Eigen::Index>(term.parameter);
-      square[term.coordinate] = moments.of_output(term.output).YY(at, at) / (term.scale * term.scale);
+    if (term.kind == Term::Kind::speed && term.coordinate < speeds.size() && term.scale != 0.0) {
+      speeds[term.coordinate] = &term;
     }
   }
-  if (!square[0] || !square[1] || !(*square[0] > 0.0)) {
+  if (speeds[0] == nullptr || speeds[1] == nullptr) {
     return std::nullopt;
   }
-  return 0.5 * s.robot.track_width * std::sqrt(*square[1] / *square[0]);
+  std::array<double, 2> square{};
+  TorqueRows rows = make_rows(log, s, errors_of_fit(s));
+  core::for_each_block(rows, [&](const RegressionBlock& block) {
+    for (std::size_t c = 0; c < square.size(); ++c) {
+      const Term& term = *speeds[c];
+      for (auto r = static_cast<Eigen::Index>(term.output); r < block.rows();
+           r += static_cast<Eigen::Index>(block.outputs)) {
+        const double speed = block.Y(r, static_cast<Eigen::Index>(term.parameter)) / term.scale;
+        square[c] += speed * speed;
+      }
+    }
+  });
+  log.rewind();
+  return square[0] > 0.0 ? std::optional(0.5 * s.robot.track_width * std::sqrt(square[1] / square[0])) : std::nullopt;
 }
 
 }  // namespace
@@ -802,7 +815,7 @@ Premises test_premises(LogSource& log, const Setting& s, const Fit& fit, std::ve
   Premises result;
   const Widened w = widened_for_premises(s, fit);
   const RegressionMoments rows = premise_moments(log, w);
-  result.turning = turning_over_driving(log, s, rows);
+  result.turning = turning_over_driving(log, s);
   const std::optional<identify::RowNoise> noise = row_noise(w.setting);
   if (!noise || w.model.empty() || s.measurement.effort_unsigned) {
     const char* why = !noise ? "the noise of the motion is not known" : "the log does not show the parameters";

@@ -292,9 +292,7 @@ void check_mirrored(const HealthView& view, const commission::Setting& s, const 
     along += (right + left) * (right + left);
     turn += (right - left) * (right - left);
   }
-  if (!(turn > along)) {
-    return;
-  }
+  const bool turns = turn > along;
   const auto scales = commission::physical_scales(s.robot, s.model);
   const auto found = [&](const char* name) -> std::optional<double> {
     for (std::size_t j = 0; scales && j < s.model.p(); ++j) {
@@ -315,12 +313,15 @@ void check_mirrored(const HealthView& view, const commission::Setting& s, const 
     };
     changed_places = off(*mass, *inertia) > kChangedPlaces + 2.0 * off(*inertia / square, *mass * square);
   }
+  if (!turns && !changed_places) {
+    return;
+  }
   out.push_back({.id = "units.wheel_mirrored",
                  .topic = FindingTopic::units,
                  .severity = changed_places ? FindingSeverity::fatal : FindingSeverity::warning,
-                 .sentence = fmt::format("As its wheels count, the robot turns on the spot more than it drives ({:.2g} "
+                 .sentence = fmt::format("As its wheels count, the robot turns on the spot {} than it drives ({:.2g} "
                                          "times as fast){}, and the log has neither gyro nor pose to tell.",
-                                         std::sqrt(turn / along),
+                                         turns ? "more" : "less", std::sqrt(turn / along),
                                          changed_places ? "; mass and yaw inertia fit the robot file if one wheel, its "
                                                           "effort included, counts backwards"
                                                         : ""),
