@@ -18,6 +18,7 @@
 #include "app/units.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "commission/watch/incident_watch.hpp"
+#include "commission/watch/other_parameters.hpp"
 #include "commission/watch/risk_watch.hpp"
 #include "detector/online_model.hpp"
 #include "formats/files/bytes.hpp"
@@ -181,6 +182,9 @@ int run(const Arguments& a) {
   const std::vector<detector::Isolation> isolations = commission::isolate_events(log, model, detection, isolation);
   const std::vector<detector::Incident> incidents =
       commission::join_events(log, model, detection, isolations, kinematic, isolation);
+  const bool asked = !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
+  const std::optional<commission::OtherParameters> other =
+      asked ? commission::explained_by_other_parameters(log, model, detection, kinematic) : std::nullopt;
   const bool fault = !detection.events.empty() || !at_risk.events.empty() ||
                      (kinematic.detection && !kinematic.detection->events.empty());
   const logs::LogReport& read = log.report();
@@ -193,12 +197,15 @@ int run(const Arguments& a) {
     results::add_kinematic(json, kinematic, model);
     results::add_at_risk(json, at_risk, model);
     results::add_incidents(json, incidents);
+    if (asked) {
+      results::add_other_parameters(json, other);
+    }
     results::add_undecided(json, undecided, share);
     std::string page;
     if (!a.common.out.empty()) {
       page = report::detect_report(detection, model, context,
                                    {.detection = kinematic.detection, .message = kinematic.message}, isolations,
-                                   at_risk, incidents, undecided);
+                                   at_risk, incidents, undecided, other ? &*other : nullptr);
     }
     publish(a.common, json, "detection.json", page);
   }
@@ -208,7 +215,8 @@ int run(const Arguments& a) {
   }
   if (!a.common.quiet && !a.common.json) {
     print_log(logs::sentences(log.report()));
-    say_lines(summary(incidents, [&](double t) { return logs::clock_time(log.report().files.front(), t); }) +
+    say_lines(summary(other) +
+              summary(incidents, [&](double t) { return logs::clock_time(log.report().files.front(), t); }) +
               summary(detection, model) + summary(at_risk, model) + summary(kinematic, model));
     if (share > 0.0 && undecided.empty()) {
       say("not watched: {:.0f} % of the {} rows could not be decided on\n", 100.0 * share, log.report().rows_read);

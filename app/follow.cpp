@@ -193,7 +193,7 @@ class Watch {
         recorder_(model.model.n(), kMerge) {}
 
   /// Takes a row, tells an event that begins with it; whether there was a decision.
-  bool take(const LogBlock& row, std::size_t number, Teller& tell, commission::IncidentWatch& incidents, bool torque) {
+  bool take(const LogBlock& row, std::size_t number, Teller& tell, commission::IncidentWatch& incidents) {
     if (!row.segment_starts.empty()) {
       detector_.restart();
     }
@@ -206,7 +206,7 @@ class Watch {
       if (recorder_.add(i, number, row.t[0], c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm)) {
         const detector::Event& event = recorder_.events().back();
         tell([&] { return results::to_json(event, model_); }, [&] { return event_line(event, model_); });
-        incidents.event(event, torque);
+        incidents.event(event);
       } else if (c.alarm) {
         incidents.lasts(row.t[0]);
       }
@@ -409,7 +409,10 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
         },
         [&] { return "at a stated risk, " + commission::sentence(event, model.model); });
   };
-  commission::IncidentWatch incidents(model);
+  commission::IncidentWatch incidents(model, kinematic.has_value());
+  const std::vector<std::size_t> isolated =
+      *pick_columns(parser, commission::isolation_columns(model, kinematic.has_value()), missing);
+  std::vector<double> isolated_sample(isolated.size());
   const auto tell_incident = [&](const char* change, const detector::Incident& incident) {
     teller(
         [&]() -> Json {
@@ -454,11 +457,11 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
   }
   std::deque<LogBlock> untimed;  // rows whose place a later one tells
   const auto watch = [&] {
-    for (std::size_t c = 0; c < sample.size(); ++c) {
-      sample[c] = row.columns[(*pick)[c]][0];
+    for (std::size_t c = 0; c < isolated.size(); ++c) {
+      isolated_sample[c] = row.columns[isolated[c]][0];
     }
-    incidents.row(row.t[0], sample, !row.segment_starts.empty());
-    if (torque.take(row, number, teller, incidents, true)) {
+    incidents.row(row.t[0], isolated_sample, !row.segment_starts.empty());
+    if (torque.take(row, number, teller, incidents)) {
       blindness.decided(row.t[0]);
     } else {
       blindness.undecided(row.t[0]);
@@ -467,7 +470,7 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
       times.push_back(row.t[0]);
     }
     if (kinematic) {
-      kinematic->take(row, number, teller, incidents, false);
+      kinematic->take(row, number, teller, incidents);
     }
     const auto sum = [&](auto& sums, const auto& columns, std::vector<double>& values, auto& recorder) {
       if (!row.segment_starts.empty()) {

@@ -4,11 +4,13 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "commission/detection.hpp"
 #include "core/log.hpp"
+#include "detector/events.hpp"
 #include "detector/faults/isolation.hpp"
 #include "detector/learnt_model.hpp"
 #include "detector/multiscale/sum_isolation.hpp"
@@ -25,10 +27,16 @@ struct EventIsolationOptions {
 /// How long before the window of an isolation rows have to begin, s.
 [[nodiscard]] double isolation_memory(const OnlineModel& model);
 
-/// Isolates the first events of `detection`, which came of walking `log` with the torque residual of `model`, against
-/// the catalogue of its robot. Walks the log once and holds the rows around these events. One result for each of them.
-/// Where the model says something at a stated risk, sums over all scales are asked, too (narrow_by_sums()): the log is
-/// walked once more for each event.
+/// Isolates `events` of either residual, which came of walking `log` with `model`, against the catalogue of its robot,
+/// by both residuals where the log has the columns of both: a fault must explain what each shows about the alarm, and
+/// what each does not show (odometry_isolation.hpp). Walks the log once and holds the rows around these events. One
+/// result for each of them. Where the model says something at a stated risk, sums over all scales are asked, too
+/// (narrow_by_sums()): the log is walked once more for each event.
+[[nodiscard]] std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model,
+                                                              std::span<const detector::Event> events,
+                                                              const EventIsolationOptions& options = {});
+
+/// The same of the first EventIsolationOptions::most_events of `detection`.
 [[nodiscard]] std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model,
                                                               const Detection& detection,
                                                               const EventIsolationOptions& options = {});

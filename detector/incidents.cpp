@@ -28,54 +28,85 @@ std::optional<Interval> common(const Interval& a, const Interval& b) {
   return both.lower <= both.upper ? std::optional<Interval>(both) : std::nullopt;
 }
 
-// Sizes that both leave; of the later one, and `changes`, where there are none.
-void narrow_size(std::optional<Interval>& magnitude, const std::optional<Interval>& later, bool& changes) {
-  if (magnitude && later) {
-    const std::optional<Interval> both = changes ? std::nullopt : common(*magnitude, *later);
-    changes = !both;
-    magnitude = both ? *both : *later;
-  }
+Interval onsets(const FaultFinding& finding) {
+  return {finding.earlier ? -core::kInfinity : finding.onset.lower, finding.onset.upper};
 }
 
-// What is left of a candidate when a later event allows `later` of the same fault; nothing where its onset cannot be
-// that of the incident. A fault that does not jump is another one while it grows: only its onset is compared.
-std::optional<IncidentCandidate> both(IncidentCandidate now, const FaultFinding& later) {
+// The onset that both allow; true if there is one.
+bool narrow_onset(FaultFinding& finding, const FaultFinding& later) {
+  const std::optional<Interval> onset = common(onsets(finding), onsets(later));
+  if (!onset) {
+    return false;
+  }
+  finding.earlier = finding.earlier && later.earlier;
+  finding.onset.upper = onset->upper;
+  if (!finding.earlier) {
+    finding.onset.lower = onset->lower;
+  }
+  return true;
+}
+
+// The size that both allow; true if there is one.
+bool narrow_size(std::optional<Interval>& magnitude, const std::optional<Interval>& later) {
+  if (!magnitude || !later) {
+    magnitude = magnitude ? magnitude : later;
+    return true;
+  }
+  const std::optional<Interval> both = common(*magnitude, *later);
+  magnitude = both ? *both : *later;
+  return both.has_value();
+}
+
+// What sums leave, alike; of a fault that `changes`, of the later event.
+void narrow_at_risk(FaultFinding& finding, const FaultFinding& later, bool changes) {
+  if (!finding.at_risk || !later.at_risk || changes) {
+    finding.at_risk = finding.at_risk && !changes ? finding.at_risk : later.at_risk;
+    return;
+  }
+  SumFinding& now = *finding.at_risk;
+  now.excluded = now.excluded || later.at_risk->excluded;
+  if (now.excluded) {
+    return;
+  }
+  const std::optional<Interval> onset = common(now.onset, later.at_risk->onset);
+  now.excluded = !onset || !narrow_size(now.magnitude, later.at_risk->magnitude);
+  now.onset = onset.value_or(now.onset);
+}
+
+// What is left of a candidate when a later event allows `later` of the same kind; where they set in at two times nothing,
+// or, with `again`, the later one. A drift is another one while it grows: only its onset is compared.
+std::optional<IncidentCandidate> both(IncidentCandidate now, const FaultFinding& later, bool again) {
   FaultFinding& finding = now.finding;
-  if (!later.earlier) {
-    const Interval known{finding.earlier ? -core::kInfinity : finding.onset.lower, finding.onset.upper};
-    const std::optional<Interval> onset = common(known, later.onset);
-    if (!onset) {
-      return std::nullopt;
-    }
-    finding.onset = *onset;
-    finding.earlier = false;
+  if (!narrow_onset(finding, later)) {
+    return again ? std::optional<IncidentCandidate>({later, true}) : std::nullopt;
   }
   if (finding.fault.profile.jumps()) {
-    narrow_size(finding.magnitude, later.magnitude, now.changes);
+    now.changes = !narrow_size(finding.magnitude, later.magnitude) || now.changes;
+    if (now.changes) {
+      finding.magnitude = later.magnitude;
+    }
     finding.complete = finding.complete || later.complete;
   }
-  if (!finding.at_risk) {
-    finding.at_risk = later.at_risk;
-  } else if (later.at_risk) {
-    finding.at_risk->excluded = finding.at_risk->excluded || later.at_risk->excluded;
-    bool differ = now.changes;
-    narrow_size(finding.at_risk->magnitude, later.at_risk->magnitude, differ);
-  }
+  narrow_at_risk(finding, later, now.changes);
   return now;
 }
 
-Candidates common(const Candidates& now, const Candidates& later) {
+Candidates common(const Candidates& now, const Candidates& later, bool again) {
   Candidates out;
   for (const IncidentCandidate& candidate : now) {
-    for (const IncidentCandidate& other : later) {
-      if (candidate.finding.fault.name == other.finding.fault.name) {
-        if (auto left = both(candidate, other.finding)) {
-          out.push_back(std::move(*left));
-        }
+    const auto other = std::ranges::find(later, candidate.finding.fault.name,
+                                         [](const IncidentCandidate& c) { return c.finding.fault.name; });
+    if (other != later.end()) {
+      if (auto left = both(candidate, other->finding, again)) {
+        out.push_back(std::move(*left));
       }
     }
   }
   return out;
+}
+
+bool any_stays(const Candidates& candidates) {
+  return std::ranges::any_of(candidates, [](const IncidentCandidate& c) { return !c.changes; });
 }
 
 void rank(Candidates& candidates) {
@@ -89,6 +120,14 @@ void rank(Candidates& candidates) {
                    [&](const IncidentCandidate& a, const IncidentCandidate& b) { return key(a) < key(b); });
 }
 
+Incident opened_by(const Event& event) {
+  Incident incident;
+  incident.start = event.start;
+  incident.alarm = event.alarm;
+  incident.end = event.end;
+  return incident;
+}
+
 }  // namespace
 
 bool IncidentRecorder::asks(const Event& event) const {
@@ -96,36 +135,59 @@ bool IncidentRecorder::asks(const Event& event) const {
          event.alarm - open_->last_examined >= options_.patience * (event.alarm - open_->alarm);
 }
 
-IncidentRecorder::Outcome IncidentRecorder::add(const Event& event, const Isolation* isolation, bool asked) {
-  Candidates found = isolation != nullptr ? consistent_of(*isolation) : Candidates{};
-  Outcome outcome;
+// The candidates after an event that was examined; another incident is opened where it is of another fault.
+IncidentRecorder::Outcome IncidentRecorder::take(const Event& event, const Isolation& isolation) {
+  Candidates found = consistent_of(isolation);
+  Outcome outcome{.change = Change::extended};
   if (open_) {
-    const bool soon = event.start - open_->end <= options_.quiet;
-    const bool first = open_->examined == open_->unexplained;  // nothing has been explained yet
-    Candidates left = first && soon ? found : common(open_->candidates, found);
-    if (!asked || (found.empty() ? soon : !left.empty())) {
-      if (!found.empty()) {
-        outcome.change = left.size() != open_->candidates.size() ? Change::narrowed : Change::extended;
-        open_->candidates = std::move(left);
-      } else {
-        outcome.change = Change::extended;
-      }
-    } else {
-      outcome.closed = std::exchange(open_, std::nullopt);
+    Incident& now = *open_;
+    // Where nothing was examined yet, nothing speaks against it.
+    const bool soon = now.examined == 0 || event.start - now.end <= options_.quiet;
+    const bool nothing_yet = now.examined == now.unexplained;
+    Candidates left = common(now.candidates, found, false);
+    if (soon && left.empty()) {
+      left = common(now.candidates, found, true);
     }
+    if (soon && (nothing_yet || found.empty())) {
+      left = nothing_yet ? found : now.candidates;
+      for (IncidentCandidate& candidate : left) {
+        candidate.changes = candidate.changes || now.examined > 0;
+      }
+    }
+    if (soon || !left.empty()) {
+      const bool stays = any_stays(left), fewer = left.size() != now.candidates.size();
+      outcome.change = fewer || stays != now.stays ? Change::narrowed : Change::extended;
+      now.stays = stays;
+      now.candidates = std::move(left);
+    } else {
+      outcome = {.change = Change::opened, .closed = std::exchange(open_, std::nullopt)};
+    }
+  } else {
+    outcome.change = Change::opened;
   }
   if (!open_) {
-    open_ = Incident{.start = event.start, .alarm = event.alarm, .end = event.end, .candidates = found};
+    open_ = opened_by(event);
+    open_->stays = !found.empty();
+    open_->candidates = found;
+  }
+  ++open_->examined;
+  open_->unexplained += found.empty() ? 1 : 0;
+  open_->last_examined = event.alarm;
+  rank(open_->candidates);
+  return outcome;
+}
+
+IncidentRecorder::Outcome IncidentRecorder::add(const Event& event, const Isolation* isolation, bool asked) {
+  Outcome outcome{.change = Change::extended};
+  if (isolation != nullptr) {
+    outcome = take(event, *isolation);
+  } else if (!open_ || (asked && event.start - open_->end > options_.quiet)) {
+    outcome = {.change = Change::opened, .closed = std::exchange(open_, std::nullopt)};
+    open_ = opened_by(event);
   }
   open_->start = std::min(open_->start, event.start);
   open_->end = std::max(open_->end, event.end);
   ++open_->events;
-  if (isolation != nullptr) {
-    ++open_->examined;
-    open_->unexplained += found.empty() ? 1 : 0;
-    open_->last_examined = event.alarm;
-  }
-  rank(open_->candidates);
   return outcome;
 }
 

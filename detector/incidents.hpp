@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
 /// Incidents: events that one fault explains, joined.
+///
+/// The class of faults behind it: **one cause, a step that stays**, of one size from one onset on, of a kind that the
+/// catalogue has. isolate() never excludes such a fault at any event, and its size and onset lie in the intervals of
+/// each. So its kind is a candidate of every event that was examined, and size and onset lie in what is common to
+/// their intervals: **of that class the true fault is never lost, whatever rows, restarts of the filter and residuals
+/// lie between the events**, and where nothing is common the cause is none of that class. What is left then
+/// (Incident::stays is false) has kinds whose size changed, or none: it proves nothing, and is said so.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +19,13 @@
 
 namespace wheelwright::detector {
 
-/// A fault that may have caused all events of an incident that were examined.
+/// A fault that may have caused the events of an incident that were examined.
 struct IncidentCandidate {
   FaultFinding finding;  ///< size and onset that are left when all these events are taken together
-  bool changes = false;  ///< no one size explains them all: `finding` has that of the last
+  bool changes = false;  ///< no one size and onset explains them all: `finding` has that of the last that it explains
 };
 
-/// Events that one fault explains.
+/// Events that one fault explains, or that came too soon one after the other to be told apart.
 struct Incident {
   double start = 0.0;           ///< first instant outside, s
   double alarm = 0.0;           ///< first alarm, s
@@ -26,7 +33,8 @@ struct Incident {
   std::size_t events = 0;       ///< number of events, of either residual
   std::size_t examined = 0;     ///< of these, isolated
   std::size_t unexplained = 0;  ///< of these, explained by no fault that was examined
-  double last_examined = 0.0;   ///< alarm of the last that was isolated, s
+  bool stays = true;  ///< false: proved to be no one step of the catalogue that stays (where `examined` is not 0)
+  double last_examined = 0.0;  ///< alarm of the last that was isolated, s
   /// Those that are left, ranked: first what is not excluded at the stated risk, then what needs one size only, then by
   /// the width of the size's interval relative to its middle. The order is no proof.
   std::vector<IncidentCandidate> candidates;
@@ -34,25 +42,25 @@ struct Incident {
 
 /// Options of IncidentRecorder.
 struct IncidentOptions {
-  double quiet = 10.0;        ///< s: an event without an explanation belongs to an incident that ended no longer ago
+  double quiet = 10.0;        ///< s: an event that no fault of the incident explains belongs to it if that ended no
+                              ///< longer ago
   std::size_t all_up_to = 8;  ///< so many events of an incident are all examined
   double patience = 0.25;     ///< later ones when this share of the incident's age has passed since the last
 };
 
 /// Joins events, in the order of their alarms. Holds one incident: the open one.
 ///
-/// An event belongs to the open incident where some candidate explains it, too: that fault is consistent with the data
-/// around it, and its onset may lie where the incident's does. Where none does, another incident is opened. An event
-/// that nothing examined explains, or that was not examined, belongs to it where it comes soon
-/// (IncidentOptions::quiet); one that was not asked for (asks()) belongs to it always. Under the hypothesis of one
-/// fault at a time the true one stays among the candidates as isolate() never excludes it; a fault whose size changes
-/// is kept, with the last size.
+/// An event belongs to the open incident where some candidate explains it, too, with a size and an onset that it may
+/// have in all events before. Where none does it belongs to it if it comes soon (IncidentOptions::quiet), and the
+/// incident is then none of one fault that stays: of its candidates those are kept that explain both with another size
+/// or onset, marked as changing. Where it comes later another incident is opened. An event that was not asked for
+/// (asks()) always belongs to it.
 class IncidentRecorder {
  public:
   /// What an event did.
   enum class Change {
     opened,    ///< it is the first of a new incident
-    narrowed,  ///< the incident's faults are fewer, or it got its first ones
+    narrowed,  ///< the incident's faults are fewer, it got its first ones, or it is none of one fault that stays
     extended   ///< nothing but the number of events and the end
   };
   /// What came of an event.
@@ -63,9 +71,10 @@ class IncidentRecorder {
 
   /// Nothing is open.
   explicit IncidentRecorder(IncidentOptions options = {}) : options_(options) {}
-  /// Whether an event of the torque residual with this alarm should be isolated before it is added.
+  /// Whether an event with this alarm should be isolated before it is added.
   [[nodiscard]] bool asks(const Event& event) const;
-  /// Takes the next event, with its isolation where there is one; `asked` is false where asks() was.
+  /// Takes the next event, with its isolation where there is one; `asked` is false where asks() was, or where the event
+  /// cannot be isolated.
   Outcome add(const Event& event, const Isolation* isolation, bool asked = true);
   /// The open incident lasts up to `t`, s.
   void lasts(double t) {
@@ -77,6 +86,8 @@ class IncidentRecorder {
   [[nodiscard]] const std::optional<Incident>& open() const { return open_; }
 
  private:
+  Outcome take(const Event& event, const Isolation& isolation);
+
   IncidentOptions options_;
   std::optional<Incident> open_;
 };

@@ -11,6 +11,7 @@
 #include "commission/margin_survey.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "commission/watch/incident_watch.hpp"
+#include "commission/watch/other_parameters.hpp"
 #include "core/check.hpp"
 #include "detector/online_model.hpp"
 #include "formats/robots/robot_file.hpp"
@@ -154,6 +155,8 @@ struct DetectionObject {
   std::vector<detector::Incident> incidents;
   std::string undecided;
   double undecided_share = 0.0;
+  bool asked_other = false;
+  std::optional<commission::OtherParameters> other{};
 
   [[nodiscard]] bool fault() const {
     return !detection.events.empty() || !at_risk.events.empty() ||
@@ -165,12 +168,15 @@ struct DetectionObject {
     results::add_kinematic(json, kinematic, *model.model);
     results::add_at_risk(json, at_risk, *model.model);
     results::add_incidents(json, incidents);
+    if (asked_other) {
+      results::add_other_parameters(json, other);
+    }
     results::add_undecided(json, undecided, undecided_share);
     return json;
   }
   [[nodiscard]] std::string summary() const {
-    return words::summary(incidents) + words::summary(detection, *model.model) + words::summary(at_risk, *model.model) +
-           words::summary(kinematic, *model.model);
+    return words::summary(other) + words::summary(incidents) + words::summary(detection, *model.model) +
+           words::summary(at_risk, *model.model) + words::summary(kinematic, *model.model);
   }
 };
 
@@ -189,7 +195,7 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
     const LogWalk walk(log);
     logs::require_columns(*log.source, model->measurement.columns());
     WatchedLog source(*log.source, work);
-    DetectionObject out{{model, given.path}, log.name(), {}, {}, {}, {}, {}, {}, 0.0};
+    DetectionObject out{{model, given.path}, log.name(), {}, {}, {}, {}, {}, {}, 0.0, false, {}};
     const auto tell = work.teller();
     tell("the torque residual", 0.0);
     out.detection = detect(source, make_detector(*model, own));
@@ -202,6 +208,11 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
     isolation.isolation.threads = threads;
     out.isolations = commission::isolate_events(source, *model, out.detection, isolation);
     out.incidents = commission::join_events(source, *model, out.detection, out.isolations, out.kinematic, isolation);
+    out.asked_other =
+        !out.detection.events.empty() || (out.kinematic.detection && !out.kinematic.detection->events.empty());
+    if (out.asked_other) {
+      out.other = commission::explained_by_other_parameters(source, *model, out.detection, out.kinematic);
+    }
     const logs::LogReport& read = log.source->report();
     out.undecided = words::why_not_decided(out.detection, *model, read.rows, log.source->median_step(), read.rows_read,
                                            logs::sentences(read));

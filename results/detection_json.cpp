@@ -89,6 +89,7 @@ Json to_json(const detector::Incident& incident) {
           {"events", incident.events},
           {"examined", incident.examined},
           {"unexplained", incident.unexplained},
+          {"stays", incident.stays},
           {"candidates", std::move(candidates)},
           {"sentence", words::incident_sentence(incident)}};
 }
@@ -98,6 +99,22 @@ void add_incidents(Json& detection, const std::vector<detector::Incident>& incid
   for (const detector::Incident& incident : incidents) {
     list.push_back(to_json(incident));
   }
+}
+
+void add_other_parameters(Json& detection, const std::optional<commission::OtherParameters>& other) {
+  Json& entry = detection["other_parameters"] = nullptr;
+  if (!other) {
+    return;
+  }
+  Json changes = Json::array();
+  for (const commission::ChangedParameter& change : other->changes) {
+    changes.push_back({{"parameter", change.name},
+                       {"unit", change.unit},
+                       {"before", {change.before.lower, change.before.upper}},
+                       {"now", {change.now.lower, change.now.upper}}});
+  }
+  entry = {
+      {"residuals", other->residuals}, {"changes", std::move(changes)}, {"sentence", commission::sentence(*other)}};
 }
 
 void add_undecided(Json& detection, const std::string& why, double share) {

@@ -9,6 +9,7 @@
 
 #include "commission/detection.hpp"
 #include "commission/watch/blind_watch.hpp"
+#include "commission/watch/other_parameters.hpp"
 #include "commission/watch/risk_watch.hpp"
 #include "detector/events.hpp"
 #include "detector/faults/isolation.hpp"
@@ -37,6 +38,9 @@ namespace wheelwright::results {
 
 /// Adds the incidents, in their order, to a detection as JSON.
 void add_incidents(Json& detection, const std::vector<detector::Incident>& incidents);
+
+/// Adds to a detection with alarms whether other constant parameters explain them all, and which: null where they do not.
+void add_other_parameters(Json& detection, const std::optional<commission::OtherParameters>& other);
 
 /// Adds to a detection why its log as a whole was not decided on (words::why_not_decided()), and the share of the rows
 /// that were not (commission::undecided_share()); nothing where `why` is empty, and where the share is 0.

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "commission/watch/blind_watch.hpp"
+#include "detector/faults/odometry_isolation.hpp"
 #include "detector/faults/reference_motion.hpp"
 #include "detector/multiscale/sum_response.hpp"
 #include "detector/online_model.hpp"
@@ -259,14 +260,73 @@ std::string names(const detector::Isolation& isolation, Verdict verdict) {
 
 }  // namespace
 
-double isolation_memory(const OnlineModel& model) { return (kMemory + model.filter.settle) / model.filter.beta; }
+double isolation_memory(const OnlineModel& model) {
+  const double torque = (kMemory + model.filter.settle) / model.filter.beta;
+  return model.kinematic ? std::max(torque, 2.0 * model.kinematic->window) : torque;
+}
 
-std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model, const Detection& detection,
+namespace {
+
+bool has_columns(const LogSource& log, const std::vector<std::string>& names) {
+  return std::ranges::all_of(names, [&](const std::string& name) { return log.find(name).has_value(); });
+}
+
+// What the kinematic residual of a piece of the log leaves of `faults`; nothing where there is none.
+std::optional<detector::Isolation> isolate_kinematics(LogSource& piece, const OnlineModel& model,
+                                                      const std::vector<FaultType>& faults,
+                                                      const detector::Event& event,
+                                                      const detector::IsolationOptions& options) {
+  if (!model.kinematic || !has_columns(piece, model.kinematic->measurement.columns())) {
+    return std::nullopt;
+  }
+  const detector::KinematicModel& kinematic = *model.kinematic;
+  const detector::OdometryReference reference =
+      detector::read_odometry(piece, detector::make_filter(kinematic), model.model);
+  return detector::isolate_by_odometry(reference, model.model, kinematic.measurement, kinematic.errors,
+                                       kinematic.window, Polytope(kinematic.facets, kinematic.box), faults, event.start,
+                                       event.alarm, options);
+}
+
+// By both residuals: what the kinematic one excludes is not looked for in the other.
+detector::Isolation isolate_piece(LogSource& piece, const OnlineModel& model, const RegressorFilter& filter,
+                                  const Polytope& set, const std::vector<FaultType>& faults,
+                                  const detector::Event& event, const detector::IsolationOptions& options) {
+  const detector::ReferenceMotion motion = detector::read_reference(piece, filter);
+  const auto kinematic = isolate_kinematics(piece, model, faults, event, options);
+  if (!kinematic) {
+    return detector::isolate(motion, filter, set, faults, event.start, event.alarm, options);
+  }
+  std::vector<FaultType> left;
+  for (const detector::FaultFinding& finding : kinematic->findings) {
+    if (finding.verdict != Verdict::excluded) {
+      left.push_back(finding.fault);
+    }
+  }
+  detector::Isolation out = *kinematic;
+  for (std::size_t k = 0; k < faults.size(); ++k) {
+    out.findings[k] = {};
+    out.findings[k].fault = faults[k];
+  }
+  if (motion.instants() > 0 && motion.t.back() >= event.alarm) {
+    const detector::Isolation torque = detector::isolate(motion, filter, set, left, event.start, event.alarm, options);
+    out.window = torque.window;
+    for (const detector::FaultFinding& finding : torque.findings) {
+      *std::ranges::find(out.findings, finding.fault.name,
+                         [](const detector::FaultFinding& f) { return f.fault.name; }) = finding;
+    }
+  }
+  detector::narrow_by(out, *kinematic, model.measurement.nominal_step + model.kinematic->measurement.nominal_step);
+  return out;
+}
+
+}  // namespace
+
+std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model,
+                                                std::span<const detector::Event> events,
                                                 const EventIsolationOptions& options) {
   const RegressorFilter filter(model.model, model.filter, model.measurement, model.errors);
   std::vector<Piece> pieces;
-  for (std::size_t k = 0; k < std::min(detection.events.size(), options.most_events); ++k) {
-    const detector::Event& event = detection.events[k];
+  for (const detector::Event& event : events) {
     const double memory = isolation_memory(model);
     pieces.push_back({.row = event.start_sample,
                       .from = event.start - options.isolation.before - memory,
@@ -289,9 +349,7 @@ std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineMode
   std::vector<detector::Isolation> out;
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     TableSource source(pieces[k].table);
-    const detector::ReferenceMotion motion = detector::read_reference(source, filter);
-    out.push_back(detector::isolate(motion, filter, set, faults, detection.events[k].start, detection.events[k].alarm,
-                                    options.isolation));
+    out.push_back(isolate_piece(source, model, filter, set, faults, events[k], options.isolation));
     if (!model.at_risk) {
       continue;
     }
@@ -300,10 +358,16 @@ std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineMode
     if (const auto drive = detector::read_sum_drive(log, model, seen, {.any_log = false, .piece = longer[k].first})) {
       detector::SumIsolationOptions sums = options.sums;
       sums.threads = options.isolation.threads;
-      detector::narrow_by_sums(out.back(), *drive, model, seen, detection.events[k].alarm, sums);
+      detector::narrow_by_sums(out.back(), *drive, model, seen, events[k].alarm, sums);
     }
   }
   return out;
+}
+
+std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model, const Detection& detection,
+                                                const EventIsolationOptions& options) {
+  const std::size_t count = std::min(detection.events.size(), options.most_events);
+  return isolate_events(log, model, std::span(detection.events.data(), count), options);
 }
 
 std::string sentence(const detector::FaultFinding& finding) {

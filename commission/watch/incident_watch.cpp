@@ -2,6 +2,7 @@
 #include "commission/watch/incident_watch.hpp"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
 namespace wheelwright::commission {
@@ -11,9 +12,7 @@ constexpr double kMostEvent = 10.0;  // s between the first instant outside and 
 
 detector::Isolation isolate_one(LogSource& log, const OnlineModel& model, const detector::Event& event,
                                 const EventIsolationOptions& options) {
-  Detection one;
-  one.events = {event};
-  return isolate_events(log, model, one, options).front();
+  return isolate_events(log, model, std::span(&event, 1), options).front();
 }
 
 }  // namespace
@@ -39,9 +38,9 @@ std::vector<detector::Incident> join_events(LogSource& log, const OnlineModel& m
   std::vector<detector::Incident> out;
   for (const Next& next : order) {
     const bool known = next.torque && *next.torque < isolations.size();
-    const bool asked = known || !next.torque || recorder.asks(*next.event);
+    const bool asked = known || recorder.asks(*next.event);
     std::optional<detector::Isolation> own;
-    if (next.torque && asked && !known) {
+    if (asked && !known) {
       own = isolate_one(log, model, *next.event, options);
     }
     auto outcome = recorder.add(*next.event, known ? &isolations[*next.torque] : own ? &*own : nullptr, asked);
@@ -55,11 +54,23 @@ std::vector<detector::Incident> join_events(LogSource& log, const OnlineModel& m
   return out;
 }
 
-IncidentWatch::IncidentWatch(const OnlineModel& model)
+std::vector<std::string> isolation_columns(const OnlineModel& model, bool kinematic) {
+  std::vector<std::string> names = model.measurement.columns();
+  if (kinematic && model.kinematic) {
+    for (const std::string& name : model.kinematic->measurement.columns()) {
+      if (std::ranges::find(names, name) == names.end()) {
+        names.push_back(name);
+      }
+    }
+  }
+  return names;
+}
+
+IncidentWatch::IncidentWatch(const OnlineModel& model, bool kinematic)
     : model_(model),
       keep_(isolation_memory(model) + options_.isolation.before + options_.isolation.after + kMostEvent) {
   model_.at_risk.reset();
-  rows_.names = model.measurement.columns();
+  rows_.names = isolation_columns(model, kinematic);
   rows_.columns.resize(rows_.names.size());
 }
 
@@ -80,19 +91,19 @@ void IncidentWatch::row(double t, const std::vector<double>& sample, bool restar
   }
 }
 
-void IncidentWatch::event(const detector::Event& event, bool torque) { waiting_.push_back({event, torque}); }
+void IncidentWatch::event(const detector::Event& event) { waiting_.push_back(event); }
 
 std::vector<IncidentWatch::Told> IncidentWatch::settle(bool all) {
   std::vector<Told> told;
   while (!waiting_.empty()) {
-    detector::Event event = waiting_.front().event;
-    const bool torque = waiting_.front().torque, asked = !torque || recorder_.asks(event);
+    detector::Event event = waiting_.front();
+    const bool asked = recorder_.asks(event);
     const double past = rows_.t.back() - event.alarm;
-    if (torque && asked && !all && past >= 0.0 && past < options_.isolation.after) {
+    if (asked && !all && past >= 0.0 && past < options_.isolation.after) {
       break;
     }
     std::optional<detector::Isolation> isolation;
-    if (torque && asked && event.alarm - event.start <= kMostEvent) {
+    if (asked && event.alarm - event.start <= kMostEvent) {
       const auto last = std::ranges::find(rows_.t.rbegin(), rows_.t.rend(), event.start);
       if (last != rows_.t.rend()) {
         event.start_sample = static_cast<std::size_t>(rows_.t.rend() - last) - 1;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <deque>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "commission/detection.hpp"
@@ -18,17 +19,21 @@
 namespace wheelwright::commission {
 
 /// Joins the events of both residuals of `log` to incidents, in the order of their alarms. `isolations` are those of
-/// the first events (isolate_events()); further ones are isolated here as IncidentRecorder::asks() for them, one walk
-/// of the log each. Events of the kinematic residual are not isolated.
+/// the first events of the torque residual (isolate_events()); further ones, and those of the kinematic residual, are
+/// isolated here as IncidentRecorder::asks() for them, one walk of the log each.
 [[nodiscard]] std::vector<detector::Incident> join_events(LogSource& log, const OnlineModel& model,
                                                           const Detection& detection,
                                                           const std::vector<detector::Isolation>& isolations,
                                                           const KinematicWatch& kinematic,
                                                           const EventIsolationOptions& options = {});
 
+/// The columns of rows that isolations of `model` look at: those of the torque residual, and with `kinematic` of the
+/// kinematic one.
+[[nodiscard]] std::vector<std::string> isolation_columns(const OnlineModel& model, bool kinematic);
+
 /// The same on rows as they come. Holds the rows that an isolation looks at, some seconds of them, and one incident.
-/// An event of the torque residual is isolated IsolationOptions::after seconds past its alarm, without sums at a stated
-/// risk: these need the whole log.
+/// An event is isolated IsolationOptions::after seconds past its alarm, without sums at a stated risk: these need the
+/// whole log.
 class IncidentWatch {
  public:
   /// What an event did that opened an incident or narrowed it, and that incident.
@@ -38,12 +43,12 @@ class IncidentWatch {
     std::optional<detector::Incident> closed;  ///< the one before
   };
 
-  /// For rows with the columns of `model`'s torque residual.
-  explicit IncidentWatch(const OnlineModel& model);
+  /// For rows with isolation_columns(model, kinematic).
+  explicit IncidentWatch(const OnlineModel& model, bool kinematic = false);
   /// The next row, before what it alarms; `restarts` where a segment begins with it.
   void row(double t, const std::vector<double>& sample, bool restarts);
-  /// An event that the last row raised, of the torque residual or of another one.
-  void event(const detector::Event& event, bool torque);
+  /// An event that the last row raised, of either residual.
+  void event(const detector::Event& event);
   /// What has been settled up to the last row; with `all` all there is.
   [[nodiscard]] std::vector<Told> settle(bool all = false);
   /// An alarm stands at time `t`: the open incident lasts.
@@ -52,15 +57,11 @@ class IncidentWatch {
   [[nodiscard]] const std::optional<detector::Incident>& open() const { return recorder_.open(); }
 
  private:
-  struct Waiting {
-    detector::Event event;
-    bool torque;
-  };
   OnlineModel model_;
   EventIsolationOptions options_;
   double keep_;  // s
   LogTable rows_;
-  std::deque<Waiting> waiting_;
+  std::deque<detector::Event> waiting_;
   detector::IncidentRecorder recorder_;
 };
 

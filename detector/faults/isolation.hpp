@@ -80,7 +80,8 @@ struct FaultFinding {
   Verdict verdict = Verdict::not_examined;
   std::optional<Interval> magnitude;  ///< where consistent, unless it is there or not: holds that of a step
   Interval onset{};                   ///< where consistent: holds that of a step, s
-  bool earlier = false;               ///< the onset may also lie before the window (then onset.lower is its beginning)
+  bool earlier = false;               ///< the onset may also lie before the window (then onset.lower is its beginning):
+                                      ///< before its memory, in a gap of the log, or before the log
   bool complete = true;               ///< the budget sufficed
   std::size_t programs = 0;           ///< linear programs that were solved
   std::optional<SumFinding> at_risk{};  ///< where sums over scales were asked

@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 
 #include "core/check.hpp"
+#include "detector/detector.hpp"
 
 namespace wheelwright::detector {
 namespace {
@@ -41,6 +42,9 @@ OdometryReference read_odometry(LogSource& log, filter::OdometryFilter filter, c
     if (sample.starts) {
       filter.restart();
       begins = true;
+    }
+    if (!is_whole(sample.t, now)) {
+      return;
     }
     const bool settled = filter.step(sample.t, now);
     for (std::size_t w = 0; w < 2; ++w) {

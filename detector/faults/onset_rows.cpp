@@ -155,6 +155,20 @@ OnsetRows::State OnsetRows::left(std::size_t from, std::size_t at) const {
           sum(now.fast, -std::exp(-kernel_.gamma() * x), before.fast), now.soft};
 }
 
+// The same of a fault that was there before first_: nothing jumps.
+OnsetRows::State OnsetRows::broken(std::size_t at) const {
+  const FaultSignals none = FaultSignals::none(*model_);
+  State impulse{none, none, none, none};
+  impulse.z1.g1 = impulse.fast.g1 = jump(first_);
+  if (!motion_->cuts.empty()) {
+    impulse.soft.g1 = impulse.z1.g1;
+  }
+  pass(impulse, first_, at);
+  const State& now = state_[at - first_];
+  return {sum(now.z1, -1.0, impulse.z1), sum(now.z2, -1.0, impulse.z2), sum(now.fast, -1.0, impulse.fast),
+          sum(now.soft, -1.0, impulse.soft)};
+}
+
 void OnsetRows::between(std::size_t a, std::size_t b) {
   check::that(a >= first_ && a < b && b + 1 < end_, "onset", "instants of the motion");
   s_ = b + 1;
@@ -163,8 +177,7 @@ void OnsetRows::between(std::size_t a, std::size_t b) {
   bound_ = {none, none, none, none};
   const std::size_t from = a > first_ ? a - 1 : a;
   const core::RowMatrix counted = jump(s_);
-  for (std::size_t k = from; k <= s_; ++k) {
-    State state = left(k, s_);
+  const auto hold = [&](State state) {
     state.z1.g1 -= counted;
     state.fast.g1 -= counted;
     state.soft.g1 -= counted;
@@ -172,6 +185,12 @@ void OnsetRows::between(std::size_t a, std::size_t b) {
     raise(bound_.z1, state.z1);
     raise(bound_.z2, state.z2);
     raise(bound_.fast, state.fast);
+  };
+  for (std::size_t k = from; k <= s_; ++k) {
+    hold(left(k, s_));
+  }
+  if (a == first_) {
+    hold(broken(s_));
   }
   // The speed's own error in the impulse.
   Eigen::VectorXd error = Eigen::VectorXd::Zero(motion_->speed.rows());
@@ -268,7 +287,8 @@ std::array<double, 3> OnsetRows::left_bounds(std::size_t i, double kappa, const 
   return {slow * size(bound_.z2) + quick * z1, slow * z1, quick * (size(bound_.fast) + cut)};
 }
 
-std::array<double, 3> OnsetRows::left_bounds(double effort) const {
+std::array<double, 3> OnsetRows::offset_left_bounds(std::size_t i, double size) const {
+  const double effort = size * std::abs(fault_.offset[static_cast<Eigen::Index>(i)]);
   const double memory = 1.0 / design_.beta;
   if (design_.order == 1) {
     return {memory * effort, 0.0, 0.0};

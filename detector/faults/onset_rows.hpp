@@ -10,7 +10,8 @@
 /// (order 1: α e^{−βx} A): the filter is linear, so what happened in [T, t_s] lives on in its state at t_s alone
 /// (kernel.hpp). A, B and C, for each output, are that state beyond the one of an onset at t_s itself. They are bounded
 /// by what onsets at the instants of [t_a, t_s] leave there, times kTransition: that is what covers a step between two
-/// samples, whose interval mixes both sides.
+/// samples, whose interval mixes both sides. Where the filter begins at t_a a step from before it leaves what one at
+/// t_a does less the jump, since the weights of a segment begin with it (regressor_filter.hpp); that is held, too.
 ///
 /// Errors |ĝ1 − g1| <= e1, |ĝ2 − g2| <= e2, |ĉ − c| <= e_c: SignatureErrors. Where motion between samples counts, Δ is
 /// the row's own dY, from the efforts as they were logged: a faulty robot's motion may be what they say, or what they
@@ -43,8 +44,35 @@ struct OnsetRow {
 /// A fault of the encoders alone as a fault of motion, in κ' = κ/(1 + κ), of what they show; its range is in κ' too.
 [[nodiscard]] FaultType as_motion_of_reading(const FaultType& fault);
 
-/// Rows of one fault for one onset interval after the other.
-class OnsetRows {
+/// Rows of one fault for one onset interval after the other, whichever residual they belong to.
+class HypothesisRows {
+ public:
+  virtual ~HypothesisRows() = default;
+  /// The onset lies between instants `a` and `b` > a, b + 1 < end; where `a` is the first instant, it may also lie
+  /// before it if the rows' memory begins there. Rows before `a` are healthy, rows of instants in [a, b + 1] are not
+  /// spoken of.
+  virtual void between(std::size_t a, std::size_t b) = 0;
+  /// The instant of t_s, b + 1.
+  [[nodiscard]] virtual std::size_t start() const = 0;
+  /// Row of output `i` at instant k > start().
+  [[nodiscard]] virtual OnsetRow row(std::size_t k, std::size_t i) = 0;
+  /// Whether what was before t_s leaves anything beside what row() says.
+  [[nodiscard]] virtual bool leaves() const { return false; }
+  /// |A|, |B| and |C| of output `i` are at most this for |θ_j| <= largest_j and |κ| <= `kappa`.
+  [[nodiscard]] virtual std::array<double, 3> left_bounds(std::size_t /*i*/, double /*kappa*/,
+                                                          const Eigen::VectorXd& /*largest*/) const {
+    return {};
+  }
+  /// The same of an offset that was never larger than `size` times the fault's before t_s.
+  [[nodiscard]] virtual std::array<double, 3> offset_left_bounds(std::size_t /*i*/, double /*size*/) const {
+    return {};
+  }
+  /// True if κ of the rows is κ' of a fault of the encoders.
+  [[nodiscard]] virtual bool encoder() const = 0;
+};
+
+/// Rows of the torque residual.
+class OnsetRows final : public HypothesisRows {
  public:
   /// Times the states that onsets between two samples may leave.
   static constexpr double kTransition = 2.0;
@@ -57,20 +85,14 @@ class OnsetRows {
   OnsetRows(const FaultType& fault, const Model& model, const FilterDesign& design, const ReferenceMotion& motion,
             std::size_t first, std::size_t end);
 
-  /// The onset lies between instants `a` and `b` > a, b + 1 < end. Rows before `a` are healthy, rows of instants in
-  /// [a, b + 1] are not spoken of.
-  void between(std::size_t a, std::size_t b);
-  /// The instant of t_s, b + 1.
-  [[nodiscard]] std::size_t start() const { return s_; }
-  /// Row of output `i` at instant k > start().
-  [[nodiscard]] OnsetRow row(std::size_t k, std::size_t i);
-  /// |A|, |B| and |C| of output `i` are at most this for |θ_j| <= largest_j and |κ| <= `kappa`.
-  [[nodiscard]] std::array<double, 3> left_bounds(std::size_t i, double kappa, const Eigen::VectorXd& largest) const;
-  /// The same of an effort that was never larger than `effort` before t_s.
-  [[nodiscard]] std::array<double, 3> left_bounds(double effort) const;
-
-  /// True if κ of the rows is κ' of a fault of the encoders.
-  [[nodiscard]] bool encoder() const { return encoder_; }
+  void between(std::size_t a, std::size_t b) override;
+  [[nodiscard]] std::size_t start() const override { return s_; }
+  [[nodiscard]] OnsetRow row(std::size_t k, std::size_t i) override;
+  [[nodiscard]] bool leaves() const override { return true; }
+  [[nodiscard]] std::array<double, 3> left_bounds(std::size_t i, double kappa,
+                                                  const Eigen::VectorXd& largest) const override;
+  [[nodiscard]] std::array<double, 3> offset_left_bounds(std::size_t i, double size) const override;
+  [[nodiscard]] bool encoder() const override { return encoder_; }
 
  private:
   struct State {
@@ -78,6 +100,7 @@ class OnsetRows {
   };
   [[nodiscard]] core::RowMatrix jump(std::size_t k) const;
   [[nodiscard]] State left(std::size_t from, std::size_t at) const;
+  [[nodiscard]] State broken(std::size_t at) const;
   void pass(State& state, std::size_t from, std::size_t to) const;
   [[nodiscard]] FaultSignals filtered(std::size_t k) const;
   [[nodiscard]] double way(std::size_t from, std::size_t to) const { return way_[to - first_] - way_[from - first_]; }

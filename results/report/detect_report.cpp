@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "commission/event_isolation.hpp"
+#include "commission/watch/other_parameters.hpp"
 #include "core/limits.hpp"
 #include "results/report/drawing.hpp"
 #include "results/report/outlook.hpp"
@@ -161,7 +162,7 @@ std::string at_risk_section(const commission::RiskWatch& watch, const OnlineMode
 std::string detect_report(const Detection& detection, const OnlineModel& model, const ReportContext& context,
                           const KinematicFindings& kinematic, const std::vector<detector::Isolation>& isolations,
                           const commission::RiskWatch& at_risk, const std::vector<detector::Incident>& incidents,
-                          const std::string& undecided) {
+                          const std::string& undecided, const commission::OtherParameters* other) {
   const TimeAxis axis = axis_for(detection, context);
   std::vector<std::vector<ChartMark>> marks(detection.trace.outputs.size());
   std::vector<ChartMark> all_marks;
@@ -182,6 +183,9 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   content.verdict = detect_verdict(detection, kinematic_events + at_risk.events.size(), !undecided.empty());
   if (!undecided.empty()) {
     content.sentences.push_back(core::capital(undecided) + (undecided.ends_with('?') ? "" : "."));
+  }
+  if (other != nullptr) {
+    content.sentences.push_back(core::capital(commission::sentence(*other)) + ".");
   }
   for (const detector::Incident& incident : incidents) {  // what an event may be is said of its incident
     content.sentences.push_back(core::capital(incident_sentence(incident)));

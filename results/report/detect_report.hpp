@@ -16,6 +16,10 @@
 #include "detector/learnt_model.hpp"
 #include "results/report/page.hpp"
 
+namespace wheelwright::commission {
+struct OtherParameters;
+}  // namespace wheelwright::commission
+
 namespace wheelwright::report {
 
 /// Findings of the kinematic residual.
@@ -29,12 +33,14 @@ struct KinematicFindings {
 /// the kinematic residual. `at_risk` is the same log under the detector at a stated risk. `isolations` belong to the
 /// first events, in their order; `incidents` join all events and stand first. It loads nothing when opened; every name
 /// is escaped, every number is finite. `undecided` says why the log as a whole was not decided on; empty where it was.
+/// `other` parameters that explain the whole log stand before the incidents; null where there are none.
 [[nodiscard]] std::string detect_report(const Detection& detection, const OnlineModel& model,
                                         const ReportContext& context, const KinematicFindings& kinematic = {},
                                         const std::vector<detector::Isolation>& isolations = {},
                                         const commission::RiskWatch& at_risk = {},
                                         const std::vector<detector::Incident>& incidents = {},
-                                        const std::string& undecided = {});
+                                        const std::string& undecided = {},
+                                        const commission::OtherParameters* other = nullptr);
 
 /// Smallest certain size over the delay, both logarithmic: for each manoeuvre the median over its onsets, and the size
 /// that is certain at every one of them (thin). Empty where nothing is certain.

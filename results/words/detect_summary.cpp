@@ -117,6 +117,10 @@ std::string summary(const Detection& d, const OnlineModel& model) {
   return text;
 }
 
+std::string summary(const std::optional<commission::OtherParameters>& other) {
+  return other ? commission::sentence(*other) + "\n" : std::string();
+}
+
 std::string summary(const std::vector<detector::Incident>& incidents, const std::function<std::string(double)>& clock) {
   std::string text;
   for (std::size_t k = 0; k < incidents.size(); ++k) {

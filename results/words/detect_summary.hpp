@@ -11,6 +11,7 @@
 
 #include "commission/detection.hpp"
 #include "commission/watch/blind_watch.hpp"
+#include "commission/watch/other_parameters.hpp"
 #include "commission/watch/risk_watch.hpp"
 #include "detector/events.hpp"
 #include "detector/incidents.hpp"
@@ -26,6 +27,9 @@ namespace wheelwright::words {
 
 /// Summary of the detector at a stated risk for a terminal; empty where the model says nothing at a risk.
 [[nodiscard]] std::string summary(const commission::RiskWatch& watch, const OnlineModel& model);
+
+/// Other parameters as the cause of all alarms, for a terminal: a line; empty where they are none.
+[[nodiscard]] std::string summary(const std::optional<commission::OtherParameters>& other);
 
 /// The incidents for a terminal, a line each; empty where there are none. `clock` makes the moment by a wall clock of a
 /// time of the log (s), empty where there is none.

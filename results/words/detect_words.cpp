@@ -126,25 +126,28 @@ std::string incident_sentence(const detector::Incident& incident) {
   std::vector<std::string> faults;
   for (const detector::IncidentCandidate& candidate : incident.candidates) {
     faults.push_back(commission::sentence(candidate.finding) +
-                     (candidate.changes ? " (the size changes: that of the last event)" : ""));
+                     (candidate.changes ? " (its size changes: that of the last event)" : ""));
   }
   std::string text;
   if (faults.empty()) {
-    text = incident.examined == 0 ? "the robot does not move as its wheels roll"
-                                  : "nothing in the catalogue that was examined explains it";
+    text = incident.examined == 0                      ? "not examined"
+           : incident.unexplained == incident.examined ? "nothing of the catalogue that was examined explains this"
+                                                       : "no one fault of the catalogue that stays explains all of "
+                                                         "this: several faults, or one that grows";
     text += fmt::format(", since {:.2f} s", incident.start);
   } else {
     const std::size_t shown = std::min(faults.size(), most + 1);
     const bool none_at_risk = std::ranges::all_of(incident.candidates, [](const detector::IncidentCandidate& c) {
       return c.finding.at_risk && c.finding.at_risk->excluded;
     });
-    text = (none_at_risk ? "at the stated risk no fault that was examined, each as one that stays; for certain not "
-                           "excluded: "
-                         : "") +
+    text = (!incident.stays ? "no one fault that stays explains all of this; one that changes may be: "
+            : none_at_risk  ? "at the stated risk no fault that was examined, each as one that stays; for certain not "
+                              "excluded: "
+                            : "") +
            faults.front();
     if (shown > 1) {
-      text += fmt::format(
-          "; {}{}", none_at_risk ? "" : "also possible: ", fmt::join(faults.begin() + 1, faults.begin() + shown, "; "));
+      text += fmt::format("; {}{}", none_at_risk && incident.stays ? "" : "also possible: ",
+                          fmt::join(faults.begin() + 1, faults.begin() + shown, "; "));
     }
     if (faults.size() > shown) {
       text += fmt::format("; and {} more", faults.size() - shown);

@@ -38,6 +38,7 @@ class Robot:
     ki: float = 0.0
     heavier: float = 1.0  # factor on the mass from the middle of the log on
     worn: float = 1.0  # factor on the radius of the left wheel
+    worn_late: float = 1.0  # another one, from the middle of the log on
     phase: float = 0.0
     top: float = 0.0  # m/s that is meant to be reached
     fine: int = 0  # integration steps a sample
@@ -107,7 +108,7 @@ def simulate(robots):
     for robot in robots:
         robot.fine = int(np.ceil(1.0 / robot.rate / 0.002)) * 2
     of = {name: np.array([getattr(r, name) for r in robots]) for name in
-          "mass inertia viscous viscous_yaw coulomb radius track rate seconds kp ki fine heavier worn".split()}
+          "mass inertia viscous viscous_yaw coulomb radius track rate seconds kp ki fine heavier worn worn_late".split()}
     many, h = len(robots), 1.0 / of["rate"] / of["fine"]
     last = np.ceil(of["seconds"] / h).astype(int)
     size = max(max(len(r.speed if r.torque is None else r.torque) for r in robots), 1)
@@ -137,6 +138,9 @@ def simulate(robots):
         if (k == halves).any():
             now = k >= halves
             d_v, d_w, g_v, g_w = coefficients(np.where(now, of["mass"] * of["heavier"], of["mass"]))
+            radii = of["radius"] * np.array([np.ones(many), of["worn"] * np.where(now, of["worn_late"], 1.0)])
+            limit = of["coulomb"] / radii
+            omega = np.array([v + half * w, v - half * w]) / radii
         due = (k + phase) % period == 0
         if due.any():
             at = np.minimum(k * h / TABLE + 1e-6, size - 1.001)
@@ -168,11 +172,14 @@ def simulate(robots):
 
 def body(true, robot):
     """x, y (m), theta (rad), yaw rate (rad/s) of the true motion."""
-    theta = (true["phi_r"] - robot.worn * true["phi_l"]) * robot.radius / robot.track
-    way = (true["phi_r"] + robot.worn * true["phi_l"]) * robot.radius / 2
+    late = np.arange(len(true["t"])) >= len(true["t"]) // 2
+    worn = robot.worn * np.where(late, robot.worn_late, 1.0)
+    left = np.cumsum(np.diff(true["phi_l"], prepend=0.0) * np.roll(worn, 1))
+    theta = (true["phi_r"] - left) * robot.radius / robot.track
+    way = (true["phi_r"] + left) * robot.radius / 2
     step, mean = np.diff(way, prepend=way[0]), theta - np.diff(theta, prepend=theta[0]) / 2
     return {"x": np.cumsum(step * np.cos(mean)), "y": np.cumsum(step * np.sin(mean)), "theta": theta,
-            "gyro_z": (true["omega_r"] - robot.worn * true["omega_l"]) * robot.radius / robot.track}
+            "gyro_z": (true["omega_r"] - worn * true["omega_l"]) * robot.radius / robot.track}
 
 
 def low_pass(x, step, tau):

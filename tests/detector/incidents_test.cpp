@@ -63,6 +63,7 @@ TEST(Incidents, AFaultThatGrowsIsOneIncidentAndSaysSo) {
   ASSERT_EQ(recorder.open()->candidates.size(), 2u);
   EXPECT_EQ(recorder.open()->candidates[0].finding.fault.name, "steady");
   EXPECT_TRUE(recorder.open()->candidates[1].changes);
+  EXPECT_TRUE(recorder.open()->stays);
   EXPECT_EQ(recorder.open()->candidates[1].finding.magnitude->upper, -0.2);
 }
 
@@ -73,7 +74,9 @@ TEST(Incidents, WhatNoFaultOfTheFirstExplainsIsAnother) {
   recorder.add(event_at(10.0), &left);
   EXPECT_FALSE(recorder.add(event_at(12.0), &nothing).closed) << "unexplained, but soon";
   EXPECT_EQ(recorder.open()->unexplained, 1u);
-  EXPECT_EQ(recorder.open()->candidates.size(), 1u);
+  ASSERT_EQ(recorder.open()->candidates.size(), 1u);
+  EXPECT_TRUE(recorder.open()->candidates[0].changes);
+  EXPECT_FALSE(recorder.open()->stays);
   const auto outcome = recorder.add(event_at(40.0), &right);
   EXPECT_EQ(outcome.change, Change::opened);
   ASSERT_TRUE(outcome.closed);
@@ -82,6 +85,49 @@ TEST(Incidents, WhatNoFaultOfTheFirstExplainsIsAnother) {
   // A first event that nothing explains takes its faults from one that comes soon.
   const Isolation late = of({may_be("left", {0.1, 0.2}, {61.5, 62.0})});
   EXPECT_EQ(recorder.add(event_at(62.0), &late).change, Change::narrowed);
+  EXPECT_EQ(recorder.open()->candidates.size(), 1u);
+  EXPECT_FALSE(recorder.open()->stays);
+}
+
+TEST(Incidents, WhatNoOneFaultThatStaysExplainsIsSaidSo) {
+  IncidentRecorder recorder;
+  const Isolation first = of({may_be("left", {0.1, 0.2}, {9.5, 10.0}), may_be("bias", {0.1, 0.2}, {9.5, 10.0})});
+  const Isolation second = of({may_be("right", {0.1, 0.2}, {11.5, 12.0}), may_be("bias", {0.1, 0.2}, {11.5, 12.0})});
+  const Isolation third = of({may_be("right", {0.1, 0.2}, {11.0, 11.0}, true)});
+  recorder.add(event_at(10.0), &first);
+  EXPECT_TRUE(recorder.open()->stays);
+  EXPECT_EQ(recorder.add(event_at(12.0), &second).change, Change::narrowed);
+  EXPECT_FALSE(recorder.open()->stays);
+  ASSERT_EQ(recorder.open()->candidates.size(), 1u);
+  EXPECT_EQ(recorder.open()->candidates[0].finding.fault.name, "bias");
+  EXPECT_EQ(recorder.open()->candidates[0].finding.onset.lower, 11.5) << "of the last event that it explains";
+  EXPECT_FALSE(recorder.add(event_at(14.0), &third).closed);
+  EXPECT_TRUE(recorder.open()->candidates.empty());
+  EXPECT_EQ(recorder.open()->events, 3u);
+}
+
+TEST(Incidents, AnEventOfTheSameFaultGoesOnAfterAGap) {
+  IncidentRecorder recorder;
+  const Isolation first = of({may_be("left", {0.1, 0.3}, {9.5, 10.0})});
+  const Isolation later = of({may_be("left", {0.2, 0.4}, {100.0, 100.1}, true)});
+  recorder.add(event_at(10.0), &first);
+  EXPECT_EQ(recorder.add(event_at(100.0), &later).change, Change::extended);
+  EXPECT_TRUE(recorder.open()->stays);
+  EXPECT_EQ(recorder.open()->candidates[0].finding.magnitude->lower, 0.2);
+  EXPECT_EQ(recorder.open()->candidates[0].finding.magnitude->upper, 0.3);
+  EXPECT_EQ(recorder.open()->candidates[0].finding.onset.lower, 9.5);
+  EXPECT_FALSE(recorder.open()->candidates[0].finding.earlier);
+}
+
+TEST(Incidents, WhatWasNotExaminedSpeaksAgainstNothing) {
+  IncidentRecorder recorder;
+  recorder.add(event_at(10.0), nullptr, false);
+  EXPECT_EQ(recorder.open()->examined, 0u);
+  const Isolation left = of({may_be("left", {0.1, 0.2}, {39.5, 40.0})});
+  EXPECT_FALSE(recorder.add(event_at(40.0), &left).closed);
+  EXPECT_TRUE(recorder.open()->stays);
+  EXPECT_FALSE(recorder.add(event_at(90.0), nullptr, false).closed);
+  EXPECT_EQ(recorder.open()->events, 3u);
   EXPECT_EQ(recorder.open()->candidates.size(), 1u);
 }
 

@@ -214,6 +214,12 @@ TEST(IncidentSentence, BeginsWithWhatTheStatedRiskLeaves) {
   EXPECT_THAT(incident_sentence(incident), AllOf(HasSubstr("also possible"), Not(HasSubstr("not excluded: "))));
   incident.candidates.erase(incident.candidates.begin());
   EXPECT_THAT(incident_sentence(incident), testing::StartsWith("at the stated risk no fault that was examined"));
+  incident.stays = false;
+  EXPECT_THAT(incident_sentence(incident), testing::StartsWith("no one fault that stays"));
+  incident.candidates.clear();
+  EXPECT_THAT(incident_sentence(incident), testing::StartsWith("no one fault of the catalogue that stays"));
+  incident.unexplained = incident.examined;
+  EXPECT_THAT(incident_sentence(incident), testing::StartsWith("nothing of the catalogue"));
 }
 
 }  // namespace
