@@ -271,52 +271,77 @@ bool has_columns(const LogSource& log, const std::vector<std::string>& names) {
   return std::ranges::all_of(names, [&](const std::string& name) { return log.find(name).has_value(); });
 }
 
-// What the kinematic residual of a piece of the log leaves of `faults`; nothing where there is none.
-std::optional<detector::Isolation> isolate_kinematics(LogSource& piece, const OnlineModel& model,
-                                                      const std::vector<FaultType>& faults,
-                                                      const detector::Event& event,
-                                                      const detector::IsolationOptions& options) {
+using Faults = std::vector<FaultType>;
+
+// `findings` on some of `faults`, with the others not examined.
+detector::Isolation findings_on(const Faults& faults, const detector::Isolation& findings) {
+  detector::Isolation out;
+  out.window = findings.window;
+  out.findings.resize(faults.size());
+  for (std::size_t k = 0; k < faults.size(); ++k) {
+    const auto at = std::ranges::find(findings.findings, faults[k].name,
+                                      [](const detector::FaultFinding& finding) { return finding.fault.name; });
+    if (at != findings.findings.end()) {
+      out.findings[k] = *at;
+    } else {
+      out.findings[k].fault = faults[k];
+    }
+  }
+  return out;
+}
+
+// Those of `faults` that `isolation`, of the same faults, does not exclude, if they are `wanted`.
+template <typename Wanted>
+Faults not_excluded(const detector::Isolation& isolation, const Wanted& wanted) {
+  Faults out;
+  for (const detector::FaultFinding& finding : isolation.findings) {
+    if (finding.verdict != Verdict::excluded && wanted(finding.fault)) {
+      out.push_back(finding.fault);
+    }
+  }
+  return out;
+}
+
+// By both residuals. The one that shows something is asked first, since it excludes most, the other about what is left.
+detector::Isolation isolate_piece(LogSource& piece, const OnlineModel& model, const RegressorFilter& filter,
+                                  const Polytope& set, const Faults& faults, const detector::Event& event,
+                                  const detector::IsolationOptions& options) {
+  const detector::ReferenceMotion motion = detector::read_reference(piece, filter);
+  const auto by_torque = [&](const Faults& some) {
+    const bool covered = motion.instants() > 0 && motion.t.back() >= event.alarm;
+    return findings_on(faults, covered ? detector::isolate(motion, filter, set, some, event.start, event.alarm, options)
+                                       : detector::Isolation{});
+  };
   if (!model.kinematic || !has_columns(piece, model.kinematic->measurement.columns())) {
-    return std::nullopt;
+    return by_torque(faults);
   }
   const detector::KinematicModel& kinematic = *model.kinematic;
   const detector::OdometryReference reference =
       detector::read_odometry(piece, detector::make_filter(kinematic), model.model);
-  return detector::isolate_by_odometry(reference, model.model, kinematic.measurement, kinematic.errors,
-                                       kinematic.window, Polytope(kinematic.facets, kinematic.box), faults, event.start,
-                                       event.alarm, options);
-}
-
-// By both residuals: what the kinematic one excludes is not looked for in the other.
-detector::Isolation isolate_piece(LogSource& piece, const OnlineModel& model, const RegressorFilter& filter,
-                                  const Polytope& set, const std::vector<FaultType>& faults,
-                                  const detector::Event& event, const detector::IsolationOptions& options) {
-  const detector::ReferenceMotion motion = detector::read_reference(piece, filter);
-  const auto kinematic = isolate_kinematics(piece, model, faults, event, options);
-  if (!kinematic) {
-    return detector::isolate(motion, filter, set, faults, event.start, event.alarm, options);
+  const Polytope lengths(kinematic.facets, kinematic.box);
+  const auto by_odometry = [&](const Faults& some) {
+    return findings_on(
+        faults, detector::isolate_by_odometry(reference, model.model, kinematic.measurement, kinematic.errors,
+                                              kinematic.window, lengths, some, event.start, event.alarm, options));
+  };
+  const auto shows = [](const FaultType& fault) { return detector::shows_in_odometry(fault); };
+  Faults hidden, moving;
+  for (const FaultType& fault : faults) {
+    (shows(fault) ? moving : hidden).push_back(fault);
   }
-  std::vector<FaultType> left;
-  for (const detector::FaultFinding& finding : kinematic->findings) {
-    if (finding.verdict != Verdict::excluded) {
-      left.push_back(finding.fault);
-    }
+  const double slack = model.measurement.nominal_step + kinematic.measurement.nominal_step;
+  detector::Isolation out = by_odometry(hidden);
+  if (out.count(Verdict::excluded) > 0) {
+    detector::narrow_by(out, by_odometry(moving), slack);
+    const Faults left = not_excluded(out, [](const FaultType&) { return true; });
+    detector::Isolation torque = by_torque(left);
+    detector::narrow_by(torque, out, slack);
+    return torque;
   }
-  detector::Isolation out = *kinematic;
-  for (std::size_t k = 0; k < faults.size(); ++k) {
-    out.findings[k] = {};
-    out.findings[k].fault = faults[k];
-  }
-  if (motion.instants() > 0 && motion.t.back() >= event.alarm) {
-    const detector::Isolation torque = detector::isolate(motion, filter, set, left, event.start, event.alarm, options);
-    out.window = torque.window;
-    for (const detector::FaultFinding& finding : torque.findings) {
-      *std::ranges::find(out.findings, finding.fault.name,
-                         [](const detector::FaultFinding& f) { return f.fault.name; }) = finding;
-    }
-  }
-  detector::narrow_by(out, *kinematic, model.measurement.nominal_step + model.kinematic->measurement.nominal_step);
-  return out;
+  detector::Isolation torque = by_torque(faults);
+  detector::narrow_by(torque, out, slack);
+  detector::narrow_by(torque, by_odometry(not_excluded(torque, shows)), slack);
+  return torque;
 }
 
 }  // namespace

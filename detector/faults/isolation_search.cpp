@@ -230,7 +230,12 @@ class Search {
       }
     }
     box.sides.resize(static_cast<std::size_t>(variables_), {-1.0, 1.0});
-    std::vector<HalfSpace> all = facets();
+    if (rows_of_set_ == 0) {
+      half_spaces_ = facets();
+      rows_of_set_ = half_spaces_.size();
+    }
+    half_spaces_.resize(rows_of_set_ + 2 * data_.size());
+    std::size_t next = rows_of_set_;
     const bounds::SlabRows slabs(box);
     std::vector<double> a(static_cast<std::size_t>(variables_)), da = a;
     const RegressionBlock& data = in_.motion.rows;
@@ -270,12 +275,10 @@ class Search {
           }
         }
       }
-      HalfSpace upper, lower;
-      slabs.half_spaces(a, da, y, dy + kRowRounding * sum, {}, upper, lower);
-      all.push_back(std::move(upper));
-      all.push_back(std::move(lower));
+      slabs.half_spaces(a, da, y, dy + kRowRounding * sum, {}, half_spaces_[next], half_spaces_[next + 1]);
+      next += 2;
     }
-    return solve(all, box, kappa, middle, eta);
+    return solve(half_spaces_, box, kappa, middle, eta);
   }
 
   std::vector<HalfSpace> facets() const {
@@ -296,23 +299,31 @@ class Search {
       coordinates.centre[j] = in_.centre[j];
       coordinates.transform(j, j) = std::max(in_.half[j], 1e-9 * in_.largest[j] + 1e-300);
     }
-    std::vector<HalfSpace> all = rows;
-    for (HalfSpace& side : bounds::sides_as_rows(box)) {
-      all.push_back(std::move(side));
+    const auto inner_rows = static_cast<Eigen::Index>(rows.size()), m = inner_rows + 2 * variables_;
+    const Eigen::VectorXd scale = coordinates.transform.diagonal();
+    scaled_.resize(variables_, m);
+    right_.resize(m);
+    norms_.resize(m);
+    for (Eigen::Index i = 0; i < inner_rows; ++i) {
+      const HalfSpace& row = rows[static_cast<std::size_t>(i)];
+      auto g = scaled_.col(i);
+      g = scale.cwiseProduct(row.a);
+      norms_[i] = std::max(g.norm(), std::numeric_limits<double>::min());
+      g /= norms_[i];
+      right_[i] = (row.b - row.a.dot(coordinates.centre)) / norms_[i];
     }
-    const auto m = static_cast<Eigen::Index>(all.size());
-    Eigen::MatrixXd a(variables_, m);
-    Eigen::VectorXd b(m), norms(m);
-    for (Eigen::Index i = 0; i < m; ++i) {
-      const HalfSpace& row = all[static_cast<std::size_t>(i)];
-      const Eigen::VectorXd g = coordinates.transform * row.a;
-      norms[i] = std::max(g.norm(), std::numeric_limits<double>::min());
-      a.col(i) = g / norms[i];
-      b[i] = (row.b - row.a.dot(coordinates.centre)) / norms[i];
+    for (Eigen::Index j = 0; j < variables_; ++j) {
+      const Interval& side = box.sides[static_cast<std::size_t>(j)];
+      const Eigen::Index at = inner_rows + 2 * j;
+      scaled_.middleCols(at, 2).setZero();
+      scaled_(j, at) = -1.0;
+      scaled_(j, at + 1) = 1.0;
+      right_[at] = (coordinates.centre[j] - side.lower) / scale[j];
+      right_[at + 1] = (side.upper - coordinates.centre[j]) / scale[j];
     }
     bounds::LinearProgram program(Eigen::VectorXd::Constant(variables_, -3.0),
                                   Eigen::VectorXd::Constant(variables_, 3.0));
-    program.add_rows(a, b);
+    program.add_rows(scaled_, right_);
     double ends[2] = {1.0, 1.0};  // of −d, d
     for (int k = 0; k < 2; ++k) {
       Eigen::VectorXd direction = Eigen::VectorXd::Zero(variables_);
@@ -335,7 +346,7 @@ class Search {
           const int i = solution.rows[r];
           if (i < static_cast<int>(rows.size())) {
             members.push_back(
-                {rows[static_cast<std::size_t>(i)], solution.multipliers[static_cast<Eigen::Index>(r)] / norms[i]});
+                {rows[static_cast<std::size_t>(i)], solution.multipliers[static_cast<Eigen::Index>(r)] / norms_[i]});
           }
         }
         ends[k] = bounds::certified_upper_bound({direction.data(), static_cast<std::size_t>(variables_)}, members, box);
@@ -358,6 +369,10 @@ class Search {
   bool free_offset_;
   double largest_offset_;
   std::vector<Row> data_;
+  std::vector<HalfSpace> half_spaces_;  // of a program: those of the set, then two of each row
+  std::size_t rows_of_set_ = 0;
+  Eigen::MatrixXd scaled_;  // its rows as columns of norm 1, the box's sides last
+  Eigen::VectorXd right_, norms_;
   std::size_t programs_ = 0;
   bool found_ = false;
   std::size_t first_ = 0, last_ = 0;

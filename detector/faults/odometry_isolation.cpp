@@ -66,12 +66,6 @@ bool rows_are_known(const FaultType& fault) {
          (fault.seen * fault.seen - fault.seen).cwiseAbs().maxCoeff() <= 1e-12 * fault.seen.cwiseAbs().maxCoeff();
 }
 
-// True if the fault changes how the robot moves, or what encoders show of it.
-bool leaves_a_trace(const FaultType& fault) {
-  const auto any = [](const auto& part) { return part.size() > 0 && !part.isZero(0.0); };
-  return any(fault.motion) || any(fault.slip) || any(fault.seen) || fault.lateral != 0.0;
-}
-
 class OdometryOnsetRows final : public HypothesisRows {
  public:
   OdometryOnsetRows(const FaultType& fault, const Model& model, const filter::OdometryMeasurement& measurement,
@@ -252,6 +246,11 @@ std::optional<FaultFinding> left_by_both(const FaultFinding& a, const FaultFindi
 
 }  // namespace
 
+bool shows_in_odometry(const FaultType& fault) {
+  const auto any = [](const auto& part) { return part.size() > 0 && !part.isZero(0.0); };
+  return any(fault.motion) || any(fault.slip) || any(fault.seen) || fault.lateral != 0.0;
+}
+
 Isolation isolate_by_odometry(const OdometryReference& reference, const Model& model,
                               const filter::OdometryMeasurement& measurement, const filter::OdometryErrors& errors,
                               double window, const Polytope& set, const std::vector<FaultType>& faults, double outside,
@@ -284,7 +283,7 @@ Isolation isolate_by_odometry(const OdometryReference& reference, const Model& m
   core::for_all(faults.size(), options.threads, [&](std::size_t k) {
     FaultFinding& finding = isolation.findings[k];
     validate(finding.fault, model);
-    if (!leaves_a_trace(finding.fault)) {
+    if (!shows_in_odometry(finding.fault)) {
       take_healthy(healthy, w, motion, finding);
     } else if (rows_are_known(finding.fault)) {
       look(finding);
@@ -306,7 +305,7 @@ void narrow_by(Isolation& isolation, const Isolation& other, double slack) {
     if (its.verdict == Verdict::consistent && own.verdict == Verdict::consistent) {
       left = left_by_both(own, its, slack);
     } else if (its.verdict == Verdict::consistent) {
-      left = leaves_a_trace(own.fault) ? its : own;
+      left = shows_in_odometry(own.fault) ? its : own;
     }
     if (left) {
       own = *left;

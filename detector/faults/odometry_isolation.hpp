@@ -31,6 +31,9 @@ class Polytope;
 
 namespace wheelwright::detector {
 
+/// True if a fault changes how the robot moves beside its wheels, or what encoders show of it.
+[[nodiscard]] bool shows_in_odometry(const FaultType& fault);
+
 /// Tells `faults` apart by the rows of the kinematic residual about an alarm, of whichever residual, at `alarm` whose
 /// first instant outside is `outside` (s): onsets lie before that. `reference` is the log's own drive, or a piece of it
 /// that begins `window` (the filter's, s) and more before the isolation's window; `set` bounds the parameters. A fault
