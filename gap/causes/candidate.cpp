@@ -2,7 +2,9 @@
 #include "gap/causes/candidate.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -202,24 +204,63 @@ std::vector<std::string> names_of(const CandidateTable& table, const CauseSet& s
 
 namespace {
 
-// Σ column² that is left beside the columns `on` with coefficients of these signs.
-double left_beside(const BlockGram& gram, std::size_t column, const std::vector<std::size_t>& on,
-                   const std::vector<int>& sign) {
+// A sum of columns, weight by column.
+using Contribution = std::vector<std::pair<std::size_t, double>>;
+
+double overlap(const BlockGram& gram, const Contribution& a, const Contribution& b) {
+  double sum = 0.0;
+  for (const auto& [i, weight_i] : a) {
+    for (const auto& [j, weight_j] : b) {
+      sum += weight_i * weight_j * gram.product(i, j);
+    }
+  }
+  return sum;
+}
+
+// A contribution by columns that have other ones.
+struct Imitation {
+  Eigen::VectorXd coefficients;
+  double left = 0.0;  // Σ² of what they do not make up
+};
+
+// `a` by the columns `on` with coefficients of these signs.
+Imitation imitation(const BlockGram& gram, const Contribution& a, const std::vector<std::size_t>& on,
+                    const std::vector<int>& sign) {
   const auto n = static_cast<Eigen::Index>(on.size());
-  Eigen::MatrixXd A(n, n);
-  Eigen::VectorXd b(n);
+  Eigen::VectorXd unit(n), b(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const std::size_t c = on[static_cast<std::size_t>(i)];
-    const double unit = 1.0 / std::sqrt(std::max(gram.square(c), std::numeric_limits<double>::min()));
-    b[i] = unit * gram.product(c, column);
+    unit[i] = 1.0 / std::sqrt(std::max(gram.square(c), std::numeric_limits<double>::min()));
+    b[i] = unit[i] * overlap(gram, {{c, 1.0}}, a);
+  }
+  Eigen::MatrixXd A(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {
-      const std::size_t d = on[static_cast<std::size_t>(j)];
       A(i, j) = A(j, i) =
-          unit * gram.product(c, d) / std::sqrt(std::max(gram.square(d), std::numeric_limits<double>::min()));
+          unit[i] * unit[j] * gram.product(on[static_cast<std::size_t>(i)], on[static_cast<std::size_t>(j)]);
     }
   }
   const Eigen::VectorXd x = signed_least_squares(A, b, sign).x;
-  return std::max(gram.square(column) + x.dot(A * x) - 2.0 * x.dot(b), 0.0);
+  return {unit.cwiseProduct(x), std::max(overlap(gram, a, a) + x.dot(A * x) - 2.0 * x.dot(b), 0.0)};
+}
+
+// Columns of θ and of a set, with the signs that their coefficients may have.
+struct SignedColumns {
+  std::vector<std::size_t> on;
+  std::vector<int> sign;
+};
+
+SignedColumns columns_beside_theta(const CandidateTable& table, const std::vector<std::size_t>& set, BaseModel base) {
+  SignedColumns columns{base == BaseModel::refitted ? table.base : table.unknown, {}};
+  columns.sign.assign(columns.on.size(), 0);
+  for (const std::size_t c : set) {
+    const Candidate& member = table.candidates[c];
+    columns.on.insert(columns.on.end(), member.columns.begin(), member.columns.end());
+    for (std::size_t k = 0; k < member.columns.size(); ++k) {
+      columns.sign.push_back(member.unit_coefficient ? 0 : member.sign[k]);
+    }
+  }
+  return columns;
 }
 
 }  // namespace
@@ -227,33 +268,80 @@ double left_beside(const BlockGram& gram, std::size_t column, const std::vector<
 double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a, const std::vector<std::size_t>& b,
                       BaseModel base) {
   const std::vector<std::size_t>& theta = base == BaseModel::refitted ? table.base : table.unknown;
-  std::vector<std::size_t> on = theta;
-  std::vector<int> sign(theta.size(), 0), opposite = sign;
-  for (const std::size_t c : b) {
-    const Candidate& member = table.candidates[c];
-    for (std::size_t k = 0; k < member.columns.size(); ++k) {
-      on.push_back(member.columns[k]);
-      sign.push_back(member.unit_coefficient ? 0 : member.sign[k]);
-      opposite.push_back(-sign.back());
-    }
-  }
+  const auto [on, sign] = columns_beside_theta(table, b, base);
+  std::vector<int> opposite = sign;
+  std::ranges::transform(opposite, opposite.begin(), std::negate<>());
   double share = 0.0;
   for (const std::size_t c : a) {
     const Candidate& member = table.candidates[c];
     for (std::size_t k = 0; k < member.columns.size(); ++k) {
-      const std::size_t column = member.columns[k];
-      const double alone = left_beside(*table.gram, column, theta, {});
+      const Contribution column{{member.columns[k], 1.0}};
+      const double alone = imitation(*table.gram, column, theta, {}).left;
       // What θ takes up is no column beside it.
-      if (!(alone > 1e-6 * table.gram->square(column))) {
+      if (!(alone > 1e-6 * table.gram->square(member.columns[k]))) {
         continue;
       }
       const int way = member.unit_coefficient ? 1 : member.sign[k];
-      const double up = way < 0 ? 0.0 : left_beside(*table.gram, column, on, sign);
-      const double down = way > 0 ? 0.0 : left_beside(*table.gram, column, on, opposite);
+      const double up = way < 0 ? 0.0 : imitation(*table.gram, column, on, sign).left;
+      const double down = way > 0 ? 0.0 : imitation(*table.gram, column, on, opposite).left;
       share = std::max(share, std::clamp(std::max(up, down) / alone, 0.0, 1.0));
     }
   }
   return share;
+}
+
+double fit_unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a,
+                          const std::vector<std::size_t>& b, BaseModel base) {
+  const std::vector<std::size_t>& theta = base == BaseModel::refitted ? table.base : table.unknown;
+  const auto [on, sign] = columns_beside_theta(table, b, base);
+  const Subset subset = subset_of(table, a, base);
+  Contribution response{{table.gram->columns(), 1.0}};
+  for (const std::size_t fixed : subset.fixed) {
+    response.emplace_back(fixed, -1.0);
+  }
+  const Eigen::VectorXd coefficients = imitation(*table.gram, response, subset.columns, subset.sign).coefficients;
+  auto next = static_cast<Eigen::Index>(theta.size());
+  double share = 0.0;
+  for (const std::size_t c : a) {
+    const Candidate& member = table.candidates[c];
+    Contribution own;
+    for (const std::size_t column : member.columns) {
+      own.emplace_back(column, member.unit_coefficient ? 1.0 : coefficients[next++]);
+    }
+    const double alone = imitation(*table.gram, own, theta, {}).left;
+    if (alone > 1e-6 * overlap(*table.gram, own, own)) {
+      share = std::max(share, std::clamp(imitation(*table.gram, own, on, sign).left / alone, 0.0, 1.0));
+    }
+  }
+  return share;
+}
+
+std::vector<double> shapley_shares(const CandidateTable& table, const CauseSet& set, BaseModel base, double gap) {
+  const std::size_t k = set.members.size();
+  std::vector<double> error(std::size_t{1} << k);
+  for (std::size_t mask = 0; mask < error.size(); ++mask) {
+    std::vector<std::size_t> members;
+    for (std::size_t i = 0; i < k; ++i) {
+      if ((mask >> i & 1U) != 0U) {
+        members.push_back(set.members[i]);
+      }
+    }
+    error[mask] = evaluate(table, std::move(members), base).held_out_error;
+  }
+  std::vector<double> shares(k, 0.0);
+  for (std::size_t i = 0; i < k; ++i) {
+    for (std::size_t mask = 0; mask < error.size(); ++mask) {
+      if ((mask >> i & 1U) != 0U) {
+        continue;
+      }
+      const auto before = static_cast<double>(std::popcount(mask));
+      const auto all = static_cast<double>(k);
+      // before! (k − before − 1)! / k!
+      const double weight = std::exp(std::lgamma(before + 1.0) + std::lgamma(all - before) - std::lgamma(all + 1.0));
+      shares[i] += weight * (error[mask] - error[mask | std::size_t{1} << i]) / std::max(gap, 1e-300);
+    }
+  }
+  return shares;
 }
 
 std::vector<std::vector<CauseSet>> search_causes(const CandidateTable& table, const CauseSearchOptions& options) {

@@ -78,6 +78,17 @@ struct CauseSet {
 [[nodiscard]] double unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a,
                                     const std::vector<std::size_t>& b, BaseModel base);
 
+/// The same for what `a` contributes with the coefficients of its fit: the largest share, after θ is fitted, of a
+/// member's contribution that the columns of `b` do not make up with coefficients of their signs. A set whose
+/// coefficients may have either sign can so be a special case of one whose may not, as a load is of one off the axle.
+[[nodiscard]] double fit_unexplained_by(const CandidateTable& table, const std::vector<std::size_t>& a,
+                                        const std::vector<std::size_t>& b, BaseModel base);
+
+/// Shapley value of each member of `set`: its mean gain in held-out mean square over all orders in which the causes
+/// could have been added, as a share of `gap` (mean squares of the floor).
+[[nodiscard]] std::vector<double> shapley_shares(const CandidateTable& table, const CauseSet& set, BaseModel base,
+                                                 double gap);
+
 /// Options of search_causes().
 struct CauseSearchOptions {
   BaseModel base = BaseModel::refitted;

@@ -2,7 +2,6 @@
 #include "gap/causes/estimates.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -360,34 +359,6 @@ FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, 
   fitted.subset = subset_of(problem.table, set.members, base);
   fitted.coefficients = problem.table.gram->fit(fitted.subset).coefficients;
   return fitted;
-}
-
-std::vector<double> shapley_shares(const CandidateTable& table, const CauseSet& set, BaseModel base, double gap) {
-  const std::size_t k = set.members.size();
-  std::vector<double> error(std::size_t{1} << k);
-  for (std::size_t mask = 0; mask < error.size(); ++mask) {
-    std::vector<std::size_t> members;
-    for (std::size_t i = 0; i < k; ++i) {
-      if ((mask >> i & 1U) != 0U) {
-        members.push_back(set.members[i]);
-      }
-    }
-    error[mask] = evaluate(table, std::move(members), base).held_out_error;
-  }
-  std::vector<double> shares(k, 0.0);
-  for (std::size_t i = 0; i < k; ++i) {
-    for (std::size_t mask = 0; mask < error.size(); ++mask) {
-      if ((mask >> i & 1U) != 0U) {
-        continue;
-      }
-      const auto before = static_cast<double>(std::popcount(mask));
-      const auto all = static_cast<double>(k);
-      // before! (k − before − 1)! / k!
-      const double weight = std::exp(std::lgamma(before + 1.0) + std::lgamma(all - before) - std::lgamma(all + 1.0));
-      shares[i] += weight * (error[mask] - error[mask | std::size_t{1} << i]) / std::max(gap, 1e-300);
-    }
-  }
-  return shares;
 }
 
 namespace {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Coefficients and shapes of a set of causes with their intervals, shapes tuned off the grid, each cause's share of
-/// the gap.
+/// Coefficients and shapes of a set of causes with their intervals, shapes tuned off the grid.
 #pragma once
 
 #include <cstddef>
@@ -82,11 +81,6 @@ struct FittedCauses {
 /// in its shapes. With `base` nominal θ is held where it is trusted.
 [[nodiscard]] FittedCauses fit_causes(const PreparedGap& prepared, const GapProblem& problem, const CauseSet& set,
                                       BaseModel base, const BlockOptions& blocks);
-
-/// Shapley value of each member of `set`: its mean gain in held-out mean square over all orders in which the causes
-/// could have been added, as a share of `gap` (mean squares of the floor).
-[[nodiscard]] std::vector<double> shapley_shares(const CandidateTable& table, const CauseSet& set, BaseModel base,
-                                                 double gap);
 
 /// Options of add_tuned_shapes().
 struct TuneOptions {

@@ -124,11 +124,7 @@ class Selector {
     add_parametric(result, rivals, nominal_trusted);
     result.left = result.structural.held_out_error - floor_;
     result.any_cause = !result.all.members.empty() || result.theta_moved;
-    result.reaches_floor =
-        result.left <= std::max({options_.tolerated * result.refitted_excess + inexact(result.structural),
-                                 std::min(options_.tolerated_nominal * gap_, 4.0 * options_.tolerated_floor),
-                                 options_.tolerated_floor}) &&
-        !arbitrary(result.credible);
+    result.reaches_floor = tolerable(result) && !arbitrary(result.credible);
     return result;
   }
 
@@ -136,11 +132,11 @@ class Selector {
   [[nodiscard]] double excess(const CauseSet& set) const { return std::max(set.held_out_error - floor_, 0.0); }
 
   // Whether `next` is worth its further causes. Nothing is where the floor is reached already.
-  [[nodiscard]] bool gains(const CauseSet& now, const CauseSet& next, double whole) const {
+  [[nodiscard]] bool gains(const CauseSet& now, const CauseSet& next, double whole,
+                           BaseModel base = BaseModel::refitted) const {
     const double gain = now.held_out_error - next.held_out_error;
-    constexpr double kLeastGap = 0.1;  // less is nothing, though a cause may lower the noise of a log that has less
     const double left = excess(now);
-    if (!(left > 0.0) || gap_ < kLeastGap) {
+    if (!(left > 0.0) || gap_ < options_.least_gap) {
       return false;
     }
     const bool counts = gain > options_.share * whole && gain > options_.part * left;
@@ -153,13 +149,13 @@ class Selector {
     // Hardly any cause that is not there leaves next to nothing of what it was not fitted to.
     const bool all = excess(next) <= std::max(options_.tolerated * left, options_.tolerated_floor);
     const double level = all && enough_time_ ? options_.significance / 2.0 : level_;
-    const Eigen::VectorXd savings = losses(now) - losses(next);
-    return signed_rank(savings) > core::normal_upper_quantile(level) || sign_flip_p(savings, options_.seed) < level;
+    return saves_more_than_chance(losses(now, base) - losses(next, base), level, options_.seed);
   }
 
-  // What the set leaves of each stretch of time: θ fitted again, but for no causes where the nominal one does better.
-  [[nodiscard]] Eigen::VectorXd losses(const CauseSet& set) const {
-    const BaseModel base = nominal_is_better_ && set.members.empty() ? BaseModel::nominal : BaseModel::refitted;
+  // What the set, evaluated with `base`, leaves of each stretch of time; with no causes and the nominal θ where that
+  // does better.
+  [[nodiscard]] Eigen::VectorXd losses(const CauseSet& set, BaseModel base = BaseModel::refitted) const {
+    base = nominal_is_better_ && set.members.empty() ? BaseModel::nominal : base;
     return table_.spaces == nullptr
                ? set.loss
                : held_out_pieces(*table_.gram, *table_.spaces, subset_of(table_, set.members, base), options_.piece);
@@ -480,16 +476,126 @@ class Selector {
     }
   }
 
+  // A set of causes that may be all of what there is.
+  struct Rival {
+    CauseSet set;
+    std::size_t structural = 0;  // of what these grew from
+    bool moves_theta = false;    // without saying why
+  };
+
+  // Lengths of the robot in the set that nothing but the efforts shows.
+  [[nodiscard]] auto unseen_lengths(const CauseSet& set) const {
+    return std::ranges::count_if(set.members,
+                                 [&](std::size_t c) { return kinds_[table_.candidates[c].effect].unseen_length; });
+  }
+
+  // Takes this one of the rivals for what there is.
+  void choose(Selection& result, const Rival& rival, const std::vector<CauseSet>& structural,
+              bool nominal_trusted) const {
+    result.all = rival.set;
+    result.structural = structural[rival.structural];
+    result.theta_moved = rival.moves_theta;
+    if (!result.theta_moved) {
+      leave_out_idle(result);
+    }
+    result.base = sized_with(result.all, nominal_trusted);
+  }
+
+  // The treatment of θ that the causes of the set have their sizes from.
+  [[nodiscard]] BaseModel sized_with(const CauseSet& set, bool nominal_trusted) const {
+    const bool moves_theta = std::ranges::any_of(set.members, [&](std::size_t c) {
+      const std::size_t effect = table_.candidates[c].effect;
+      // What stands for a cause of θ too has its size from θ held.
+      return moves_theta_only_[effect] || (nominal_trusted && !kinds_[effect].stands_for.empty());
+    });
+    return moves_theta ? BaseModel::nominal : BaseModel::refitted;
+  }
+
+  // Whether `whole` is `part` with more to choose and does not do better for it.
+  [[nodiscard]] bool needlessly_contains(const CauseSet& whole, const CauseSet& part, double structural,
+                                         BaseModel base) const {
+    return part.coefficients < whole.coefficients &&
+           fit_unexplained_by(table_, part.members, whole.members, base) < options_.contained &&
+           !gains(part, whole, structural, base);
+  }
+
+  // Leaves out of the credible sets what needlessly contains another one, and what needs two lengths of the robot to be
+  // wrong at once on a log that shows no length, where another needs none.
+  void leave_out_needless(Selection& result, const std::vector<Rival>& rivals, bool nominal_trusted) const {
+    const BaseModel base = nominal_trusted ? BaseModel::nominal : BaseModel::refitted;
+    std::vector<CredibleSet>& credible = result.credible;
+    const auto moves_theta = [&](const CredibleSet& member) {
+      return std::ranges::any_of(
+          rivals, [&](const Rival& rival) { return rival.set.members == member.set.members && rival.moves_theta; });
+    };
+    std::erase_if(credible, [&, all = credible](const CredibleSet& member) {
+      return std::ranges::any_of(all, [&](const CredibleSet& other) {
+        if (moves_theta(other) || moves_theta(member)) {
+          return false;
+        }
+        return (unseen_lengths(member.set) > 1 && unseen_lengths(other.set) == 0) ||
+               needlessly_contains(member.set, other.set, result.refitted_excess, base);
+      });
+    });
+  }
+
+  // Causes of the set whose share of the gap is more than nothing in two decimals.
+  [[nodiscard]] std::vector<std::size_t> principal(const CauseSet& set, BaseModel base) const {
+    constexpr double kNothing = 0.005;
+    std::vector<std::size_t> members;
+    const std::vector<double> shares = shapley_shares(table_, set, base, gap_);
+    for (std::size_t k = 0; k < set.members.size(); ++k) {
+      if (!(shares[k] < kNothing)) {
+        members.push_back(set.members[k]);
+      }
+    }
+    return members.empty() ? set.members : members;
+  }
+
+  // Names the principal causes of the credible sets. Where these are the same in all and do without what differs, they
+  // are all there is: of what is left too little to be told from one another is none.
+  void leave_out_trifles(Selection& result, bool nominal_trusted) const {
+    const BaseModel base = nominal_trusted ? BaseModel::nominal : BaseModel::refitted;
+    for (CredibleSet& member : result.credible) {
+      member.principal = member.set.members.size() > 1 ? principal(member.set, base) : member.set.members;
+    }
+    if (result.credible.size() < 2 || result.theta_moved) {
+      return;
+    }
+    const std::vector<std::size_t>& first = result.credible.front().principal;
+    const auto names = [&](const std::vector<std::size_t>& members) { return sorted_names({members, 0.0, {}, 0.0}); };
+    const bool same = std::ranges::all_of(
+        result.credible, [&](const CredibleSet& member) { return names(member.principal) == names(first); });
+    if (!same || first.empty() || first.size() == result.all.members.size()) {
+      return;
+    }
+    Selection without = result;
+    without.all = evaluate(table_, first, base);
+    leave_out_idle(without);
+    without.left = without.structural.held_out_error - floor_;
+    if (!tolerable(without)) {
+      return;
+    }
+    without.base = sized_with(without.all, nominal_trusted);
+    without.trifles = std::move(result.credible);
+    without.credible = {{without.all, 1.0, without.all.members}};
+    result = std::move(without);
+  }
+
+  // What the causes may leave.
+  [[nodiscard]] double tolerable_remainder(const Selection& result) const {
+    return std::max({options_.tolerated * result.refitted_excess + inexact(result.structural),
+                     std::min(options_.tolerated_nominal * gap_, 4.0 * options_.tolerated_floor),
+                     options_.tolerated_floor});
+  }
+
+  [[nodiscard]] bool tolerable(const Selection& result) const { return result.left <= tolerable_remainder(result); }
+
   void add_parametric(Selection& result, const std::vector<CauseSet>& structural_rivals, bool nominal_trusted) const {
     std::vector<CauseSet> structural = structural_rivals;
     if (structural.empty()) {
       structural.push_back(result.structural);
     }
-    struct Rival {
-      CauseSet set;
-      std::size_t structural = 0;
-      bool moves_theta = false;  // without saying why
-    };
     std::vector<Rival> rivals;
     const auto add = [&](const CauseSet& set, std::size_t i) {
       CauseSet needed = without_idle(set);
@@ -524,7 +630,8 @@ class Selector {
       }
     }
     // With θ held, the right one of causes that do as well with θ fitted again is the one that leaves least, with the
-    // fewest causes.
+    // fewest causes, and of these the fewest lengths that nothing but the efforts shows.
+    const auto unlikeliness = [&](const CauseSet& set) { return std::pair(set.members.size(), unseen_lengths(set)); };
     const std::size_t most = rivals.front().moves_theta ? SIZE_MAX : rivals.front().set.members.size();
     const auto comparable = [&](const Rival& rival) { return !rival.moves_theta && rival.set.members.size() <= most; };
     const CauseSet* least = nullptr;
@@ -539,24 +646,13 @@ class Selector {
       auto lead = rivals.end();
       for (auto rival = rivals.begin(); rival != rivals.end(); ++rival) {
         const bool good = comparable(*rival) && excess(rival->set) <= as_good;
-        if (good && (lead == rivals.end() || rival->set.members.size() < lead->set.members.size())) {
+        if (good && (lead == rivals.end() || unlikeliness(rival->set) < unlikeliness(lead->set))) {
           lead = rival;
         }
       }
       std::rotate(rivals.begin(), lead, lead + 1);
     }
-    result.all = rivals.front().set;
-    result.structural = structural[rivals.front().structural];
-    result.theta_moved = rivals.front().moves_theta;
-    if (!result.theta_moved) {
-      leave_out_idle(result);
-    }
-    const bool moves_theta = std::ranges::any_of(result.all.members, [&](std::size_t c) {
-      const std::size_t effect = table_.candidates[c].effect;
-      // What stands for a cause of θ too has its size from θ held.
-      return moves_theta_only_[effect] || (nominal_trusted && !kinds_[effect].stands_for.empty());
-    });
-    result.base = moves_theta ? BaseModel::nominal : BaseModel::refitted;
+    choose(result, rivals.front(), structural, nominal_trusted);
     std::vector<CauseSet> fewest;
     for (const Rival& rival : rivals) {
       if (rival.set.members.size() <= result.all.members.size()) {
@@ -564,6 +660,14 @@ class Selector {
       }
     }
     confide(result, fewest);
+    leave_out_needless(result, rivals, nominal_trusted);
+    if (!result.credible.empty() && result.credible.front().set.members != result.all.members) {
+      const auto of_first = [&](const Rival& rival) {
+        return rival.set.members == result.credible.front().set.members;
+      };
+      choose(result, *std::ranges::find_if(rivals, of_first), structural, nominal_trusted);
+    }
+    leave_out_trifles(result, nominal_trusted);
   }
 
   [[nodiscard]] const CauseSet& simplest_of(const std::vector<CauseSet>& sets) const {
@@ -613,6 +717,10 @@ class Selector {
 };
 
 }  // namespace
+
+bool saves_more_than_chance(const Eigen::VectorXd& savings, double level, std::uint64_t seed) {
+  return signed_rank(savings) > core::normal_upper_quantile(level) || sign_flip_p(savings, seed) < level;
+}
 
 Selection select_causes(const CandidateTable& table, const std::vector<EffectKind>& kinds, bool nominal_trusted,
                         double floor_error, const SelectionOptions& options) {

@@ -12,6 +12,14 @@
 /// the noise floor no further cause is sought. Columns are not exact (a smoothed sign, a neglected second order), so
 /// the misfit of the best set is the reference by which other sets count as equally good.
 ///
+/// Of the sets that are equally good some are no answer of their own and leave:
+/// - one that contains another one, with more coefficients, and is not worth them by the conditions of a further cause;
+/// - on a log without a pose, one that needs two lengths of the robot to be wrong at once where another needs none. By
+///   the efforts alone a robot of other lengths is one of other parameters. Masses and friction change in use; lengths
+///   do not, somebody has measured them, and a wheel and a track that are wrong together are two mistakes. For the same
+///   reason the set with the fewest such lengths is named first among those with as few causes.
+/// Causes whose share of the gap is nothing in two decimals make no set another answer (CredibleSet::principal).
+///
 /// Naive selection rule for comparison with selection.hpp (docs/methods/gap.md has its results).
 #pragma once
 
@@ -40,6 +48,7 @@ struct SelectionOptions {
   double large_part = 0.8;     ///< fraction of the remainder, with `small_share`
   double small_share = 0.002;  ///< fraction of the gap, with `large_part`
   double smallest = 0.3;       ///< least gain of a cause in any case
+  double least_gap = 0.1;      ///< less is nothing, though a cause may lower the noise of a log that has less
   double significance = 0.05;  ///< of a gain, over all effects that were tried; of one that leaves no more than is
                                ///< tolerated, of this effect alone
   double piece = 1.0;          ///< s, shortest stretch of time over which a gain is compared: errors that are further
@@ -65,6 +74,8 @@ struct SelectionOptions {
 struct CredibleSet {
   CauseSet set;
   double p_value = 1.0;
+  std::vector<std::size_t> principal{};  ///< members whose share of the gap (shapley_shares()) is at least 0.005: the
+                                         ///< others are nothing in two decimals
 };
 
 /// Result of select_causes().
@@ -72,6 +83,8 @@ struct Selection {
   CauseSet structural;  ///< best set with θ fitted again; empty: θ explains the log
   CauseSet all;         ///< with the parametric causes, θ nominal (as `structural` where no θ is trusted)
   std::vector<CredibleSet> credible;  ///< alternatives to `all`, itself first; best first
+  std::vector<CredibleSet> trifles;   ///< the credible sets before what differed in them was left out of `all`, each
+                                      ///< with another trifle beside the same principal causes; empty: nothing was
   double nominal_excess = 0.0;   ///< of M0 with θ nominal, above the floor; the refitted one where none is trusted
   double refitted_excess = 0.0;  ///< of M0 with θ fitted again, or nominal where that leaves less
   double left = 0.0;             ///< excess of `structural`
@@ -88,12 +101,18 @@ struct EffectKind {
   double inexact = 0.0;                   ///< Effect::inexact
   std::vector<std::size_t> stands_for{};  ///< Effect::stands_for, by index
   bool parametric = false;                ///< Effect::parametric
+  bool unseen_length = false;             ///< a length of the robot (DirectMeasurement::lengths), on a log without a
+                                          ///< pose: it shows in the efforts alone, as parameters do
 };
 
 /// Selects. `floor_error` is the mean square that noise alone leaves (1 where the floors are right); `kinds` has one
 /// for each effect. Effects that move θ only, which is found from the columns, are tried only with `nominal_trusted`.
 [[nodiscard]] Selection select_causes(const CandidateTable& table, const std::vector<EffectKind>& kinds,
                                       bool nominal_trusted, double floor_error, const SelectionOptions& options = {});
+
+/// Whether `savings` (of losses, one for each stretch of time) are more than chance at this level: by the signed-rank
+/// test, or by random signs of their logarithms, for a cause that shows in half of the stretches only, but by far.
+[[nodiscard]] bool saves_more_than_chance(const Eigen::VectorXd& savings, double level, std::uint64_t seed);
 
 /// A set of causes that the naive rule chose.
 struct NaiveChoice {

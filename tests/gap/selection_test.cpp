@@ -267,6 +267,127 @@ TEST(SelectCauses, PrefersTheSimplerOfNestedEffects) {
   EXPECT_TRUE(found.reaches_floor);
 }
 
+// Random columns, and a response that is a sum of some of them with noise of one floor.
+struct DrawnTable {
+  std::mt19937_64 generator;
+  std::vector<RowSpace> spaces{1};
+  CandidateTable table;
+  std::vector<EffectKind> kinds;
+
+  explicit DrawnTable(unsigned seed, Eigen::Index rows = 960) : generator(seed) {
+    spaces[0].name = "drawn";
+    spaces[0].t = Eigen::VectorXd::LinSpaced(rows, 0.0, static_cast<double>(rows) / 16.0);
+    spaces[0].response = random();
+  }
+  [[nodiscard]] Eigen::VectorXd random() {
+    std::normal_distribution<double> normal;
+    Eigen::VectorXd x(spaces[0].t.size());
+    for (double& value : x) {
+      value = normal(generator);
+    }
+    return x;
+  }
+  [[nodiscard]] double uniform(double lower, double upper) {
+    return std::uniform_real_distribution<double>(lower, upper)(generator);
+  }
+  std::size_t add(Eigen::VectorXd column) {
+    spaces[0].columns.push_back(std::move(column));
+    return spaces[0].columns.size() - 1;
+  }
+  [[nodiscard]] const Eigen::VectorXd& column(std::size_t k) const { return spaces[0].columns[k]; }
+  void effect(const std::string& name, std::vector<std::size_t> columns, std::vector<int> sign) {
+    table.candidates.push_back({table.names.size(), {}, std::move(columns), std::move(sign), false});
+    table.names.push_back(name);
+    kinds.emplace_back();
+  }
+  [[nodiscard]] Selection select(bool nominal_trusted = false) {
+    const BlockGram gram(spaces);
+    table.gram = &gram;
+    return select_causes(table, kinds, nominal_trusted, 1.0);
+  }
+  [[nodiscard]] std::vector<Names> credible(const Selection& found) const {
+    std::vector<Names> sets;
+    for (const CredibleSet& member : found.credible) {
+      sets.push_back(names_of(table, member.set));
+    }
+    return sets;
+  }
+};
+
+// A load may be taken away, one off the axle is only added: the signs of its columns say that the one is no part of the
+// other, and yet it is as soon as something was added.
+TEST(SelectCauses, ASetThatContainsAnotherLeavesUnlessItIsWorthItsCoefficients) {
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    const bool more = seed % 2 == 0;
+    DrawnTable drawn(5910 + seed);
+    drawn.table.base = {drawn.add(drawn.random())};
+    const std::size_t part = drawn.add(drawn.random()), beyond = drawn.add(drawn.random());
+    drawn.effect("whole", {part, beyond}, {1, 1});
+    drawn.effect("part", {part}, {0});
+    drawn.spaces[0].response += drawn.uniform(1.5, 6.0) * drawn.column(part);
+    drawn.spaces[0].response += (more ? drawn.uniform(1.5, 3.0) : 0.0) * drawn.column(beyond);
+    const Selection found = drawn.select();
+    const Names truth{more ? "whole" : "part"};
+    EXPECT_EQ(names_of(drawn.table, found.all), truth) << seed;
+    EXPECT_EQ(drawn.credible(found), std::vector<Names>{truth}) << seed;
+    EXPECT_TRUE(found.reaches_floor) << seed;
+  }
+}
+
+// What is left beside a cause is a three-hundredth of the gap, and two causes make it up alike.
+TEST(SelectCauses, ATrifleMakesNothingAmbiguous) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    DrawnTable drawn(5930 + seed, 1920);
+    drawn.table.base = {drawn.add(drawn.random())};
+    const std::size_t large = drawn.add(drawn.random());
+    const Eigen::VectorXd chance = drawn.random(), &first = drawn.column(large);
+    const std::size_t small = drawn.add(chance - first * (first.dot(chance) / first.squaredNorm()));
+    const std::size_t twin = drawn.add(drawn.column(small) + 0.02 * drawn.random());
+    drawn.effect("large", {large}, {0});
+    drawn.effect("small", {small}, {0});
+    drawn.effect("twin of small", {twin}, {0});
+    const double size = drawn.uniform(14.0, 16.0);
+    drawn.spaces[0].response += size * drawn.column(large) + size * std::sqrt(0.0035) * drawn.column(small);
+    const Selection found = drawn.select();
+    EXPECT_EQ(names_of(drawn.table, found.all), Names{"large"}) << seed;
+    EXPECT_EQ(found.credible.size(), 1u) << seed;
+    EXPECT_EQ(found.trifles.size(), 2u) << seed;
+    EXPECT_TRUE(found.reaches_floor) << seed;
+    // The same as a tenth of the gap is no trifle.
+    drawn.spaces[0].response += size * 0.25 * drawn.column(small);
+    const Selection told = drawn.select();
+    EXPECT_EQ(told.all.members.size(), 2u) << seed;
+    EXPECT_EQ(told.credible.size(), 2u) << seed;
+    EXPECT_TRUE(told.trifles.empty()) << seed;
+  }
+}
+
+// By the efforts alone other lengths are other parameters: every pair of two of these does as well.
+TEST(SelectCauses, OnALogWithoutAPoseLengthsComeAfterParameters) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    for (const bool pose : {false, true}) {
+      DrawnTable drawn(5950 + seed);
+      drawn.table.base = {drawn.add(drawn.random()), drawn.add(drawn.random())};
+      const Eigen::VectorXd a = drawn.column(0), b = drawn.column(1);
+      const double x = drawn.uniform(3.0, 5.0), y = drawn.uniform(0.3, 3.0);  // neither alone is the response
+      drawn.effect("radius", {drawn.add(a + x * b)}, {0});
+      drawn.effect("track", {drawn.add(a - y * b)}, {0});
+      drawn.effect("payload", {drawn.add(a)}, {0});
+      drawn.effect("viscous", {drawn.add(b)}, {0});
+      drawn.kinds[0].unseen_length = drawn.kinds[1].unseen_length = !pose;
+      drawn.spaces[0].response += drawn.uniform(2.0, 4.0) * a + drawn.uniform(2.0, 4.0) * b;
+      const Selection found = drawn.select(true);
+      const std::vector<Names> credible = drawn.credible(found);
+      const bool both_lengths = std::ranges::find(credible, Names{"radius", "track"}) != credible.end();
+      EXPECT_EQ(both_lengths, pose) << seed;
+      if (!pose) {
+        EXPECT_EQ(names_of(drawn.table, found.all), (Names{"payload", "viscous"})) << seed;
+        EXPECT_EQ(credible.front(), (Names{"payload", "viscous"})) << seed;
+      }
+    }
+  }
+}
+
 TEST(SelectCauses, AsksForNothingBelowTheFloor) {
   const Selection found = Table(2.0, 1.0).select(6.0);
   EXPECT_FALSE(found.any_cause);
