@@ -11,11 +11,13 @@
 #include <fmt/format.h>
 
 #include "core/words.hpp"
+#include "gap/causes/answers.hpp"
 #include "gap/causes/confidence.hpp"
 #include "gap/causes/confusion.hpp"
 #include "gap/causes/estimates.hpp"
 #include "gap/causes/fast_band.hpp"
 #include "gap/causes/selection.hpp"
+#include "gap/causes/visibility.hpp"
 #include "gap/effort_units.hpp"
 #include "gap/improved_robot.hpp"
 #include "gap/next/further_drive.hpp"
@@ -40,32 +42,6 @@ GapVerdict verdict_of(const Selection& found, std::size_t alternatives) {
     return GapVerdict::no_gap;
   }
   return alternatives > 1 ? GapVerdict::ambiguous : GapVerdict::explained;
-}
-
-// Which members of `set` are reported: a parametric cause that is the common part of another member is one with it.
-std::vector<bool> reported(const CandidateTable& table, const std::vector<Effect>& catalogue, const CauseSet& set) {
-  std::vector<bool> shown(set.members.size(), true);
-  for (std::size_t k = 0; k < set.members.size(); ++k) {
-    const std::string& name = table.names[table.candidates[set.members[k]].effect];
-    for (const std::size_t other : set.members) {
-      if (catalogue[table.candidates[other].effect].common == name) {
-        shown[k] = false;
-      }
-    }
-  }
-  return shown;
-}
-
-std::vector<std::string> reported_names(const CandidateTable& table, const std::vector<Effect>& catalogue,
-                                        const CauseSet& set) {
-  const std::vector<bool> shown = reported(table, catalogue, set);
-  std::vector<std::string> names;
-  for (std::size_t k = 0; k < set.members.size(); ++k) {
-    if (shown[k]) {
-      names.push_back(table.names[table.candidates[set.members[k]].effect]);
-    }
-  }
-  return names;
 }
 
 bool are_listed(const std::vector<CredibleCauses>& credible, const std::vector<std::string>& effects) {
@@ -96,15 +72,48 @@ void leave_out_unsteady(std::vector<CredibleCauses>& credible, const std::vector
   credible = std::move(kept);
 }
 
-void list_credible(Diagnosis& result, const Selection& found, const CandidateTable& table,
-                   const std::vector<Effect>& catalogue) {
+// Reported causes whose share of the gap, with that of their common part, is nothing in two decimals.
+std::vector<std::string> trifles_of(const CandidateTable& table, const std::vector<Effect>& catalogue,
+                                    const CredibleSet& member) {
+  const auto name_of = [&](std::size_t c) { return table.names[table.candidates[c].effect]; };
+  std::vector<std::string> trifles = reported_names(table, catalogue, member.set);
+  for (const std::size_t c : member.principal) {
+    std::erase_if(trifles, [&](const std::string& name) {
+      return name == name_of(c) || find_effect(catalogue, name)->common == name_of(c);
+    });
+  }
+  return trifles;
+}
+
+// Returns the number of answers among them.
+std::size_t list_credible(Diagnosis& result, const Selection& found, const CandidateTable& table,
+                          const std::vector<Effect>& catalogue) {
   for (const CredibleSet& member : found.credible) {
     CredibleCauses causes{reported_names(table, catalogue, member.set), member.set.held_out_error, member.p_value};
+    causes.trifles = trifles_of(table, catalogue, member);
     if (!are_listed(result.credible, causes.effects)) {
       result.credible.push_back(std::move(causes));
     }
   }
   leave_out_unsteady(result.credible, catalogue);
+  return number_answers(result.credible, catalogue);
+}
+
+// What was left out of the causes since their share of the gap is nothing and the log does not tell between them.
+void tell_trifles(Diagnosis& result, const Selection& found, const CandidateTable& table,
+                  const std::vector<Effect>& catalogue) {
+  std::vector<std::string> names;
+  for (const CredibleSet& member : found.trifles) {
+    for (std::string& name : trifles_of(table, catalogue, member)) {
+      if (std::ranges::find(names, name) == names.end()) {
+        names.push_back(std::move(name));
+      }
+    }
+  }
+  if (!names.empty()) {
+    result.notes.push_back("less than half a per cent of the gap may be " + core::listed(names, " or ") +
+                           ": this log does not tell between them, and they are left out");
+  }
 }
 
 void list_looked_at(Diagnosis& result, const Selection& found, const CandidateTable& table) {
@@ -260,7 +269,7 @@ void add_fast_band(Diagnosis& result, const FastBand& fast, const std::vector<Ef
   if (fast.play && play != catalogue.end() && result.verdict == GapVerdict::unexplained && left <= fast.effort_square &&
       !result.credible.empty() && has_play(result.credible.front())) {
     std::erase_if(result.credible, [&](const CredibleCauses& set) { return !has_play(set); });
-    result.verdict = result.credible.size() > 1 ? GapVerdict::ambiguous : GapVerdict::explained;
+    result.verdict = number_answers(result.credible, catalogue) > 1 ? GapVerdict::ambiguous : GapVerdict::explained;
     result.notes.push_back(
         fmt::format("{:.0f} % of the gap stay below that band, no more than what play adds in it: they are taken for "
                     "what its contact does there, which no formula here has",
@@ -373,9 +382,9 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   const Selection found = select_causes(problem.table, problem.kinds, trusted, 1.0, selection);
 
   Diagnosis result;
-  list_credible(result, found, problem.table, prepared.catalogue);
+  const std::size_t answers = list_credible(result, found, problem.table, prepared.catalogue);
   list_looked_at(result, found, problem.table);
-  result.verdict = verdict_of(found, result.credible.size());
+  result.verdict = verdict_of(found, answers);
   result.beta = prepared.row_options.beta;
   result.floor_origin = prepared.floor_origin;
   result.reference = prepared.reference;
@@ -398,6 +407,8 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   list_causes(result, prepared, problem, found.all, fitted,
               shares_of_one(
                   shapley_shares(problem.table, found.all, trusted ? BaseModel::nominal : BaseModel::refitted, whole)));
+  add_laws(result, found, prepared, problem, base, blocks);
+  tell_trifles(result, found, problem.table, prepared.catalogue);
   result.series = series_of(prepared, problem, fitted);
   result.theta = fitted.theta;
   result.fitted = fitted.effects;
@@ -407,6 +418,17 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   }
   if (const std::optional<FastBand> fast = look_at_fast_band(prepared, fitted.effects, {.blocks = blocks})) {
     add_fast_band(result, *fast, prepared.catalogue);
+  }
+  if (result.verdict == GapVerdict::no_gap) {
+    Baseline now{found.nominal_excess, evaluate(problem.table, {}, BaseModel::refitted).held_out_error - 1.0, {}};
+    for (const ResidualSeries& series : result.series) {
+      now.left.push_back(series.refitted);
+    }
+    result.visible = visible_sizes(prepared, problem, now, selection);
+  }
+  result.misfit = prepared.misfit;
+  if (result.misfit && result.verdict == GapVerdict::no_gap) {
+    result.verdict = GapVerdict::unexplained;
   }
   tell("locating", 0.65);
   WhereOptions where_to_look;
@@ -452,8 +474,9 @@ Diagnosis diagnose(LogSource& log, LogSource* baseline, const Robot& robot, cons
   }
   from_torques(result, robot, prepared.view);
   leave_out_impossible(result, prepared.drive.model);
-  if (prepared.reference == GapReference::healthy_log && prepared.drive.has_efforts && prepared.drive.has_pose() &&
-      !options.catalogue && options.without.empty()) {
+  const bool counted = prepared.reference == GapReference::healthy_log && prepared.drive.has_efforts &&
+                       prepared.drive.has_pose() && !options.catalogue && options.without.empty();
+  if (counted && !result.misfit && result.credible.size() == answers_among(result.credible)) {
     rate(result);
   }
   tell("done", 1.0);
@@ -485,6 +508,14 @@ std::string_view to_string(GapVerdict verdict) {
     case GapVerdict::unexplained: return "unexplained";
   }
   return "";
+}
+
+std::size_t answers_among(const std::vector<CredibleCauses>& credible) {
+  std::size_t count = 0;
+  for (const CredibleCauses& set : credible) {
+    count = std::max(count, set.answer + 1);
+  }
+  return count;
 }
 
 std::vector<ShrinkFigure> torque_on(LogSource& fresh, LogSource* baseline, const Robot& robot, const Diagnosis& found,

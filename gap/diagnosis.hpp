@@ -48,6 +48,13 @@ struct GapEstimate {
   bool shape = false;  ///< enters the effect's columns nonlinearly
 };
 
+/// A law that a cause may follow: an effect of its family, as fitted in its place.
+struct GapLaw {
+  std::string effect;
+  std::string sentence;
+  std::vector<GapEstimate> parameters;
+};
+
 /// One cause of the best combination.
 struct GapCause {
   std::string effect;
@@ -56,6 +63,9 @@ struct GapCause {
   std::vector<GapEstimate> parameters;
   double share = 0.0;  ///< of the gap, Shapley value over the combination; the shares add up to what is explained
   std::optional<double> probability{};  ///< that it is there, alone or with others; nothing where no record is known
+  std::string family{};                 ///< Effect::family; empty: none
+  std::vector<GapLaw> laws{};  ///< of its family between which the log does not tell, `effect` first; empty: it
+                               ///< leaves no other one standing
 };
 
 /// A member of the model confidence set.
@@ -64,7 +74,12 @@ struct CredibleCauses {
   double held_out_error = 0.0;          ///< mean square, in units of the noise floor's
   double p_value = 0.0;                 ///< that it is as good as the best member
   std::optional<double> probability{};  ///< that these causes are there and no others; nothing where no record is known
+  std::vector<std::string> trifles{};   ///< those of the effects whose share of the gap is nothing in two decimals
+  std::size_t answer = 0;               ///< number of the answer that the set belongs to, number_answers()
 };
+
+/// Number of answers among the sets (CredibleCauses::answer).
+[[nodiscard]] std::size_t answers_among(const std::vector<CredibleCauses>& credible);
 
 /// What became of diagnoses of one kind, on logs of which the causes were withheld from the tool.
 struct TrackRecord {
@@ -73,6 +88,25 @@ struct TrackRecord {
   int other = 0;    ///< on which just those of another member of the credible set were
   int causes = 0;   ///< that were named first, on all of these logs
   int present = 0;  ///< of them: that were there, alone or with others
+};
+
+/// The smallest size of a cause at which a log without a gap would not have passed for one.
+struct VisibleSize {
+  std::string effect;
+  std::string parameter;  ///< as GapCause::parameters has it
+  std::string unit;
+  double size = 0.0;  ///< in `unit`; a magnitude
+};
+
+/// A healthy robot that the model does not fit.
+struct HealthyMisfit {
+  std::string channel;
+  double share = 0.0;                ///< of that channel's mean square: what the model leaves beyond the sensors' noise
+  std::vector<std::string> known{};  ///< effects that are in the model of the healthy robot already
+  std::vector<std::string>
+      helping{};         ///< effects that would take off most of what it leaves, most first; empty: none of
+                         ///< the catalogue takes off a tenth
+  std::string regime{};  ///< in which what it leaves is concentrated; empty: in none
 };
 
 /// Two sets of causes that look alike on this log, whatever came out.
@@ -143,6 +177,8 @@ struct Diagnosis {
   std::vector<CredibleCauses> credible;  ///< model confidence set at 90 %
   std::optional<TrackRecord> record;  ///< of diagnoses like this one; with a log of the healthy robot, efforts, a pose
                                       ///< and the catalogue whole, as it was taken
+  std::vector<VisibleSize> visible;   ///< with no_gap: by effect, in the order of the catalogue
+  std::optional<HealthyMisfit> misfit;    ///< nothing: the model fits the healthy robot, or there is no log of it
   std::vector<CredibleCauses> looked_at;  ///< best sets of every size, the empty one first: what was tried
   std::vector<ConfusablePair> confusable;
   std::vector<GapShare> where;  ///< largest share first

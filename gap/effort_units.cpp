@@ -128,13 +128,24 @@ void from_torques(Diagnosis& diagnosis, const Robot& robot, const TorqueView& vi
   }
   if (!view.physical) {
     const Model model = model::make_model(robot);
+    const auto tell = [&view](std::string& name, std::string& unit) {
+      unit = effort_unit(view, unit);
+      if (name.ends_with(kMassUnit)) {
+        name.resize(name.size() - kMassUnit.size());
+      }
+    };
     for (GapCause& cause : diagnosis.causes) {
       for (GapEstimate& estimate : cause.parameters) {
-        estimate.unit = effort_unit(view, estimate.unit);
-        if (estimate.name.ends_with(kMassUnit)) {
-          estimate.name.resize(estimate.name.size() - kMassUnit.size());
+        tell(estimate.name, estimate.unit);
+      }
+      for (GapLaw& law : cause.laws) {
+        for (GapEstimate& estimate : law.parameters) {
+          tell(estimate.name, estimate.unit);
         }
       }
+    }
+    for (VisibleSize& size : diagnosis.visible) {
+      tell(size.parameter, size.unit);
     }
     for (ParameterShift& shift : diagnosis.parametric) {
       const auto parameter = std::ranges::find(model.parameters, shift.parameter, &model::Parameter::physical);

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <map>
 #include <optional>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -58,15 +59,16 @@ bool quickly_planned(const Rival& rival, const std::vector<Effect>& laws, const 
   });
 }
 
-// Each member of the credible set fitted to the drive; θ beside the first of them goes to `theta`. An effect follows
-// one law in all of them, which is the one in `laws`.
+// The first credible set of each answer fitted to the drive; θ beside the first of them goes to `theta`. An effect
+// follows one law in all of them, which is the one in `laws`.
 std::vector<Rival> fitted_rivals(const PreparedGap& prepared, const Diagnosis& diagnosis,
                                  const DiagnoseOptions& options, Eigen::VectorXd& theta, std::vector<Effect>& laws) {
   std::map<std::string, std::size_t> law;  // of each effect, its place in prepared.catalogue
   const bool trusted = std::ranges::find(prepared.trusted, true) != prepared.trusted.end();
   std::vector<Rival> rivals;
+  std::set<std::size_t> answers;
   for (const CredibleCauses& member : diagnosis.credible) {
-    if (member.effects.empty() || rivals.size() == kMostRivals) {
+    if (member.effects.empty() || rivals.size() == kMostRivals || !answers.insert(member.answer).second) {
       continue;
     }
     ShapeGrids shapes = all_shapes(prepared.catalogue, prepared.drive);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "gap/effects/effect.hpp"
 #include "gap/noise_floor.hpp"
 #include "gap/rows/drive.hpp"
+#include "gap/where.hpp"
 #include "model/filter/measurement.hpp"
 
 namespace wheelwright::gap {
@@ -257,6 +259,79 @@ std::string track_hint(const FittedEffect& effect, const Drive& drive) {
   return "";
 }
 
+// Effects that beside `found` would take off at least a tenth of what it leaves above the floor, the best two, most
+// first.
+std::vector<std::string> helping_beside(const CauseSet& found, const CandidateTable& table) {
+  constexpr double kHelps = 0.1;
+  constexpr std::size_t kMost = 2;
+  const double left = found.held_out_error - 1.0;
+  const std::vector<std::string> has = names_of(table, found);
+  std::map<std::string, double> taken;
+  for (std::size_t c = 0; c < table.candidates.size() && left > 0.0; ++c) {
+    const std::string& name = table.names[table.candidates[c].effect];
+    if (std::ranges::find(has, name) != has.end()) {
+      continue;
+    }
+    std::vector<std::size_t> members = found.members;
+    members.push_back(c);
+    std::ranges::sort(members);
+    const double share =
+        (found.held_out_error - evaluate(table, std::move(members), BaseModel::refitted).held_out_error) / left;
+    if (share > kHelps) {
+      taken[name] = std::max(taken[name], share);
+    }
+  }
+  std::vector<std::string> names;
+  while (names.size() < kMost && !taken.empty()) {
+    const auto best = std::ranges::max_element(taken, {}, &std::pair<const std::string, double>::second);
+    names.push_back(best->first);
+    taken.erase(best);
+  }
+  return names;
+}
+
+// What the model leaves of the healthy robot's efforts, if that is more than 5 % of their mean square beyond the noise
+// of the sensors: `left` and the floor that `sensors` make, by space of `rows`.
+std::optional<HealthyMisfit> misfit_of(const Drive& drive, const GapRows& rows,
+                                       const std::vector<Eigen::VectorXd>& left, const NoiseFloor& sensors,
+                                       double beta) {
+  constexpr double kFits = 0.05;
+  double beyond = 0.0, signal = 0.0, largest = 0.0;
+  std::size_t channel = 0;
+  for (std::size_t s = 0; s < drive.model.n() && drive.has_efforts; ++s) {
+    const auto i = static_cast<Eigen::Index>(s);
+    // Outputs are sums over the joints: by their weights there all are squares of the joints' efforts.
+    const double weight = 1.0 / drive.model.input.row(i).squaredNorm();
+    const auto count = static_cast<double>(left[s].size());
+    const double own = weight * (left[s].squaredNorm() / count - std::pow(sensors.efforts[i], 2));
+    beyond += std::max(own, 0.0);
+    signal += weight * rows.signal[s].squaredNorm() / count;
+    if (own > largest) {
+      largest = own;
+      channel = s;
+    }
+  }
+  if (!(beyond > kFits * signal)) {
+    return std::nullopt;
+  }
+  HealthyMisfit misfit{drive.model.outputs[channel], beyond / signal, {}, {}, {}};
+  const RowSpace& space = rows.spaces[channel];
+  ResidualSeries series;
+  series.channel = space.name;
+  series.t = space.t;
+  series.signal = rows.signal[channel];
+  series.nominal = series.refitted = series.after = left[channel];
+  series.floor = sensors.efforts[static_cast<Eigen::Index>(channel)];
+  WhereOptions where;
+  where.beta = beta;
+  for (const GapShare& share : locate_gap(drive, {series}, where)) {
+    if (misfit.regime.empty() && share.kind != "channel" && share.kind != "time" && is_finding(share)) {
+      misfit.regime = share.regime;
+    }
+  }
+  return misfit;
+}
+
 // θ, floor and effects of the healthy robot, or of the simulator.
 void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   Drive& drive = *prepared.healthy_drive;
@@ -290,6 +365,9 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   for (const std::size_t c : found.structural.members) {
     places.push_back(problem.table.candidates[c].effect);
   }
+  constexpr double kFarAbove = 4.0;  // floors
+  const std::vector<std::string> helping =
+      fit.held_out_error > kFarAbove ? helping_beside(found.structural, problem.table) : std::vector<std::string>();
   BaselineFit last{std::move(problem), subset, fit};
   settle(prepared, places, sensors, blocks, last);
   std::vector<Eigen::VectorXd> left = residuals(last.problem.rows, last.subset, last.fit.coefficients);
@@ -300,6 +378,15 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
     rows *= held_out;
   }
   const NoiseFloor floor = without_efforts(floor_of(left, last.problem.rows), drive);
+  if (!simulated) {
+    prepared.misfit = misfit_of(drive, last.problem.rows, left, sensors, beta);
+  }
+  if (prepared.misfit) {
+    prepared.misfit->helping = helping;
+    for (const FittedEffect& effect : prepared.healthy) {
+      prepared.misfit->known.push_back(effect.effect.name);
+    }
+  }
   for (const FittedEffect& effect : prepared.healthy) {
     prepared.notes.push_back((simulated ? "the simulator has " : "the healthy log shows ") + effect.effect.name +
                              " already: what is reported is in addition to it" + track_hint(effect, drive));
@@ -382,9 +469,10 @@ GapProblem make_problem(const Drive& drive, const NoiseFloor& floor, const std::
       problem.table.inertias.emplace_back(j, nominal);
     }
   }
+  const bool pose = std::ranges::find(problem.rows.kinds, GapSpace::kinematic) != problem.rows.kinds.end();
   for (const Effect& effect : catalogue) {
     problem.table.free_form.push_back(effect.free_form);
-    EffectKind kind{effect.inexact, {}, effect.parametric};
+    EffectKind kind{effect.inexact, {}, effect.parametric, !pose && effect.measured_by == DirectMeasurement::lengths};
     for (std::size_t e = 0; e < catalogue.size(); ++e) {
       if (std::ranges::find(effect.stands_for, catalogue[e].name) != effect.stands_for.end()) {
         kind.stands_for.push_back(e);

@@ -33,6 +33,9 @@ struct PreparedGap {
   std::string floor_origin;  ///< in words
   GapReference reference = GapReference::robot_file;
   GapRowOptions row_options;
+  std::optional<HealthyMisfit>
+      misfit;  ///< of a healthy robot of whose efforts the model leaves more than 5 % of the mean
+               ///< square beyond the noise of the sensors: what it leaves is no noise
   std::vector<std::string> notes;
 };
 

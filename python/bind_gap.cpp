@@ -430,21 +430,29 @@ void bind_cause(py::module_& m) {
       .def("__repr__", [](const GapEstimate& e) {
         return "<wheelwright.GapEstimate " + e.name + ": " + words::estimate_words(e) + ">";
       });
+  const auto by_name = [](const std::vector<GapEstimate>& parameters) {
+    py::dict out;
+    for (const GapEstimate& e : parameters) {
+      out[py::str(e.name)] = e;
+    }
+    return out;
+  };
+  py::class_<gap::GapLaw>(m, "GapLaw", "An effect that a cause may be, as fitted in its place.")
+      .def_readonly("effect", &gap::GapLaw::effect)
+      .def_readonly("sentence", &gap::GapLaw::sentence)
+      .def_property_readonly(
+          "parameters", [by_name](const gap::GapLaw& law) { return by_name(law.parameters); }, "by name")
+      .def("__repr__", [](const gap::GapLaw& law) { return "<wheelwright.GapLaw " + law.effect + ">"; });
   py::class_<gap::GapCause>(m, "GapCause", "One cause of the best combination.")
       .def_readonly("effect", &gap::GapCause::effect)
+      .def_readonly("family", &gap::GapCause::family, "shared by effects that are one cause; empty: none")
+      .def_readonly("laws", &gap::GapCause::laws,
+                    "effects of the family between which the log does not tell, `effect` first; empty: no other one")
       .def_readonly("sentence", &gap::GapCause::sentence)
       .def_readonly("parametric", &gap::GapCause::parametric)
       .def_readonly("share", &gap::GapCause::share, "of the gap (Shapley value over the combination)")
       .def_property_readonly(
-          "parameters",
-          [](const gap::GapCause& c) {
-            py::dict out;
-            for (const GapEstimate& e : c.parameters) {
-              out[py::str(e.name)] = e;
-            }
-            return out;
-          },
-          "by name")
+          "parameters", [by_name](const gap::GapCause& c) { return by_name(c.parameters); }, "by name")
       .def("__repr__", [](const gap::GapCause& c) { return "<wheelwright.GapCause " + c.effect + ">"; });
   py::class_<SeriesObject> series(m, "ResidualSeries",
                                   "Residuals of one channel on the rows that the analysis used; read-only views of "
@@ -532,8 +540,9 @@ void bind_gap(py::module_& m) {
           "save", [](const DiagnosisObject& d, const std::filesystem::path& path) { files::write_json(path, d.json); },
           py::arg("path"), "Writes gap.json, whole or not at all.");
   tables_of(diagnosis);
-  for (const char* key : {"credible_set", "confusable", "where", "shrink", "parametric", "contradictions",
-                          "next_manoeuvre", "not_excited", "floor_error", "floor_origin"}) {
+  for (const char* key :
+       {"credible_set", "confusable", "where", "shrink", "parametric", "contradictions", "next_manoeuvre",
+        "not_excited", "visible", "healthy_misfit", "floor_error", "floor_origin"}) {
     diagnosis.def_property_readonly(
         key, [key](const DiagnosisObject& d) { return to_python(d.json[key]); }, "as in gap.json");
   }

@@ -26,18 +26,27 @@ namespace {
 
 const char* name_of(gap::GapSpace space) { return space == gap::GapSpace::dynamic ? "dynamic" : "kinematic"; }
 
+Json estimates_json(const std::vector<gap::GapEstimate>& estimates) {
+  Json parameters = Json::object();
+  for (const gap::GapEstimate& p : estimates) {
+    parameters[p.name] = {
+        {"estimate", or_null(p.estimate)}, {"lower", or_null(p.lower)}, {"upper", or_null(p.upper)}, {"unit", p.unit}};
+  }
+  return parameters;
+}
+
 Json causes_json(const std::vector<gap::GapCause>& causes) {
   Json list = Json::array();
   for (const gap::GapCause& cause : causes) {
-    Json parameters = Json::object();
-    for (const gap::GapEstimate& p : cause.parameters) {
-      parameters[p.name] = {{"estimate", or_null(p.estimate)},
-                            {"lower", or_null(p.lower)},
-                            {"upper", or_null(p.upper)},
-                            {"unit", p.unit}};
+    Json laws = Json::array();
+    for (const gap::GapLaw& law : cause.laws) {
+      laws.push_back(
+          {{"effect", law.effect}, {"parameters", estimates_json(law.parameters)}, {"sentence", law.sentence}});
     }
     list.push_back({{"effect", cause.effect},
-                    {"parameters", std::move(parameters)},
+                    {"family", cause.family.empty() ? Json(nullptr) : Json(cause.family)},
+                    {"laws", std::move(laws)},
+                    {"parameters", estimates_json(cause.parameters)},
                     {"share", or_null(cause.share)},
                     {"parametric", cause.parametric},
                     {"probability", or_null(cause.probability)},
@@ -55,6 +64,25 @@ Json record_json(const std::optional<gap::TrackRecord>& record) {
           {"other", record->other},
           {"causes", record->causes},
           {"present", record->present}};
+}
+
+Json visible_json(const std::vector<gap::VisibleSize>& sizes) {
+  Json list = Json::array();
+  for (const gap::VisibleSize& v : sizes) {
+    list.push_back({{"effect", v.effect}, {"parameter", v.parameter}, {"size", or_null(v.size)}, {"unit", v.unit}});
+  }
+  return list;
+}
+
+Json misfit_json(const std::optional<gap::HealthyMisfit>& misfit) {
+  if (!misfit) {
+    return nullptr;
+  }
+  return {{"share", or_null(misfit->share)},
+          {"channel", misfit->channel},
+          {"regime", misfit->regime.empty() ? Json(nullptr) : Json(misfit->regime)},
+          {"known", misfit->known},
+          {"helping", misfit->helping}};
 }
 
 Json figures_json(const std::vector<gap::ShrinkFigure>& figures) {
@@ -111,7 +139,9 @@ Json to_json(const Diagnosis& d, const GapFiles& files) {
     credible.push_back({{"effects", c.effects},
                         {"held_out_error", or_null(c.held_out_error)},
                         {"p_value", or_null(c.p_value)},
-                        {"probability", or_null(c.probability)}});
+                        {"probability", or_null(c.probability)},
+                        {"answer", c.answer},
+                        {"trifles", c.trifles}});
   }
   for (const gap::ConfusablePair& pair : d.confusable) {
     confusable.push_back({{"effects", {pair.first, pair.second}},
@@ -132,6 +162,8 @@ Json to_json(const Diagnosis& d, const GapFiles& files) {
           {"causes", causes_json(d.causes)},
           {"credible_set", std::move(credible)},
           {"track_record", record_json(d.record)},
+          {"visible", visible_json(d.visible)},
+          {"healthy_misfit", misfit_json(d.misfit)},
           {"confusable", std::move(confusable)},
           {"where", where_json(d.where)},
           {"shrink",

@@ -164,7 +164,6 @@ Effect torque_gain_asymmetric() {
 Effect torque_bias(std::size_t joints) {
   Effect effect{.name = "torque_bias",
                 .sentence = "A constant torque: the offset of a sensor or an amplifier.",
-                .family = "constant_force",
                 .parameters = {{"b", "N·m", 0}},
                 .excite = "drive in all directions, forwards and backwards",
                 .measured_by = DirectMeasurement::turned_round,

@@ -82,7 +82,6 @@ Effect com_lateral() {
 Effect slope() {
   return {.name = "slope",
           .sentence = "The ground slopes.",
-          .family = "constant_force",
           .parameters = {{"g_x", "m/s²", 0}, {"g_y", "m/s²", 0}},
           .excite = "drive slowly in all directions",
           .measured_by = DirectMeasurement::turned_round,

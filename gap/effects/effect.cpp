@@ -345,6 +345,17 @@ std::string catalogue_noun(std::string_view name) {
   return effect != nullptr ? effect->noun : std::string();
 }
 
+std::string family_noun(std::string_view family) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kNouns{
+      {{"late_torque", "late torque"},
+       {"rolling_distance", "the rolling distance per count of one wheel"},
+       {"dry_friction", "dry friction"}}};
+  const auto known = std::ranges::find(kNouns, family, &std::pair<std::string_view, std::string_view>::first);
+  std::string noun(known != kNouns.end() ? known->second : family);
+  std::ranges::replace(noun, '_', ' ');
+  return noun;
+}
+
 namespace {
 
 using Shape = std::span<const double>;

@@ -87,7 +87,9 @@ struct Effect {
   std::string name{};                     ///< as in results
   std::string noun{};                     ///< as sentences call it; empty: as catalogue_noun(name)
   std::string sentence{};                 ///< description for people
-  std::string family{};                   ///< name shared by effects that are the same cause; empty: none
+  std::string family{};                   ///< name shared by effects that are one cause to whoever mends it, each by a
+                                          ///< law of its own; where a log leaves several of them standing they are one
+                                          ///< answer. Empty: none
   std::vector<std::string> steady{};      ///< causes that it is when nothing changes in time: no rival of them
   std::string common{};                   ///< parametric cause that is a part of this effect: unequal gains have a
                                           ///< mean. Where both are found it is one cause; empty: none
@@ -244,6 +246,9 @@ namespace wheelwright::gap {
 /// Noun of the effect `name` in sentences: that of its law or of its entry in the catalogue; empty where there is
 /// neither.
 [[nodiscard]] std::string catalogue_noun(std::string_view name);
+
+/// Noun of a family in sentences: "late torque"; its name as words for one that the catalogue does not have.
+[[nodiscard]] std::string family_noun(std::string_view family);
 
 /// Those that `own` lacks and whose law (effect_law.hpp) has terms for a robot of the model `model`: the terms on the
 /// smooth motion are their columns, the law's parameters their coefficients and shapes.

@@ -51,20 +51,48 @@ std::string chance_words(const std::optional<double>& probability) {
   return probability ? percent(*probability, 2) : "–";
 }
 
+std::string parameter_lines(const std::vector<gap::GapEstimate>& parameters) {
+  std::string lines;
+  for (const gap::GapEstimate& p : parameters) {
+    lines += (lines.empty() ? "" : "<br>") + escape(parameter_words(p.name)) + " " + escape(estimate_words(p));
+  }
+  return lines;
+}
+
+std::string visible_section(const Diagnosis& d) {
+  if (d.visible.empty()) {
+    return {};
+  }
+  std::vector<std::vector<Cell>> rows;
+  for (const gap::VisibleSize& v : d.visible) {
+    rows.push_back({escape(core::capital(effect_noun(v.effect))), escape(parameter_words(v.parameter)),
+                    numeric(escape(with_unit(number(v.size, 2), unit_of(v.unit))))});
+  }
+  return table({"Cause", "parameter", numeric("would have shown from")}, rows) +
+         note(
+             "The smallest size of each cause, alone, at which this log would not have passed for one without a gap, "
+             "to "
+             "some ten per cent. Causes that are not in this table could not have been seen on it.");
+}
+
 std::string causes_section(const Diagnosis& d) {
   if (d.causes.empty()) {
     return {};
   }
   std::vector<std::vector<Cell>> rows;
   for (const gap::GapCause& cause : d.causes) {
-    std::string parameters;
-    for (const gap::GapEstimate& p : cause.parameters) {
-      parameters +=
-          (parameters.empty() ? "" : "<br>") + escape(parameter_words(p.name)) + " " + escape(estimate_words(p));
+    const bool laws = !cause.laws.empty();
+    rows.push_back(
+        {escape(core::capital(cause_noun(cause))) + "<small>" +
+             escape(laws ? "By one of the laws below, between which this log does not tell." : cause.sentence) +
+             "</small>",
+         "<code>" + escape(laws ? cause.family : cause.effect) + "</code>", numeric(percent(cause.share)),
+         numeric(chance_words(cause.probability)), laws ? std::string() : parameter_lines(cause.parameters)});
+    for (const gap::GapLaw& law : cause.laws) {
+      rows.push_back({escape("either " + effect_noun(law.effect)) + "<small>" + escape(law.sentence) + "</small>",
+                      "<code>" + escape(law.effect) + "</code>", numeric(""), numeric(""),
+                      parameter_lines(law.parameters)});
     }
-    rows.push_back({escape(core::capital(effect_noun(cause.effect))) + "<small>" + escape(cause.sentence) + "</small>",
-                    "<code>" + escape(cause.effect) + "</code>", numeric(percent(cause.share)),
-                    numeric(chance_words(cause.probability)), parameters});
   }
   return table({"Cause", "name", numeric("share of<br>the gap"), numeric("chance that<br>it is there"),
                 "parameters [95 % interval]"},
@@ -373,6 +401,7 @@ std::string gap_report(const Diagnosis& d, const std::string& robot, const Repor
     }
   };
   add("causes", "Causes", causes_section(d));
+  add("visible", "What would have been seen", visible_section(d));
   add("residual", "Residual over time", residual_section(d, axis));
   add("shrink", "How far it shrinks", shrink_section(d));
   add("apart", "What cannot be told apart", apart_section(d, next_manoeuvre));

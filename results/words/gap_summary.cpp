@@ -16,12 +16,24 @@
 namespace wheelwright::words {
 namespace {
 
+std::string law_words(const gap::GapLaw& law, const std::string& indent) {
+  std::string out = fmt::format("{}{}: {}\n", indent, core::capital(words::effect_noun(law.effect)), law.sentence);
+  for (const gap::GapEstimate& p : law.parameters) {
+    out += fmt::format("{}    {} {}\n", indent, words::parameter_words(p.name), words::estimate_words(p));
+  }
+  return out;
+}
+
 std::string causes_words(const Diagnosis& d) {
   std::string out;
   for (const gap::GapCause& cause : d.causes) {
-    out += fmt::format("  {}: {}\n", core::capital(words::effect_noun(cause.effect)), cause.sentence);
-    for (const gap::GapEstimate& p : cause.parameters) {
-      out += fmt::format("      {} {}\n", words::parameter_words(p.name), words::estimate_words(p));
+    if (cause.laws.empty()) {
+      out += law_words({cause.effect, cause.sentence, cause.parameters}, "  ");
+      continue;
+    }
+    out += fmt::format("  {}, by one of these laws:\n", core::capital(words::cause_noun(cause)));
+    for (const gap::GapLaw& law : cause.laws) {
+      out += law_words(law, "    ");
     }
   }
   return out;
@@ -83,6 +95,9 @@ std::string next_step(const Diagnosis& d, const GapResults& r) {
       return r.commands ? fmt::format("drive {}, then wheelwright gap on that log.", file("next_manoeuvre.csv"))
                         : std::string("a measurement that tells the causes apart; until then any of them is a guess.");
     case gap::GapVerdict::unexplained: {
+      if (d.misfit && d.causes.empty()) {
+        return "add to the robot file what the healthy robot has and the model lacks, or choose another model.";
+      }
       const std::string where = places(d);
       return "add a term to the model: what is left lies in " +
              (where.empty() ? std::string("no regime more than in others") : where) + ".";

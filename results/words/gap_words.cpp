@@ -5,6 +5,8 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -39,27 +41,82 @@ std::string channel_words(const std::string& channel) {
   return channel == "sum" || channel == "difference" ? channel + " channel" : spaced(channel);
 }
 
-const gap::GapEstimate* first_estimate(const gap::GapCause& cause) {
-  return cause.parameters.empty() ? nullptr : &cause.parameters.front();
-}
-
-// "0.312 N·m [0.290, 0.330]" for one parameter, "a = …, b = …" for several.
-std::string parameters_of(const gap::GapCause& cause) {
-  if (cause.parameters.size() == 1) {
-    return estimate_words(*first_estimate(cause));
+// "0.312 N·m [0.290, 0.330]" for one parameter, "a …, b …" for several.
+std::string parameters_of(const std::vector<gap::GapEstimate>& parameters) {
+  if (parameters.size() == 1) {
+    return estimate_words(parameters.front());
   }
   std::vector<std::string> parts;
-  for (const gap::GapEstimate& p : cause.parameters) {
+  for (const gap::GapEstimate& p : parameters) {
     parts.push_back(parameter_words(p.name) + " " + estimate_words(p));
   }
   return core::enumerated(parts);
 }
 
+constexpr std::size_t kInHeadline = 2;  // parameters of a single cause
+
 std::string cause_sentence(const gap::GapCause& cause, bool alone) {
-  std::string out = core::capital(effect_noun(cause.effect));
-  out += cause.parametric ? "" : alone ? ", which the model lacks," : "";
+  std::string out = core::capital(cause_noun(cause));
+  out += cause.parametric && cause.laws.empty() ? "" : alone ? ", which the model lacks," : "";
   out += fmt::format(" {} {} of the gap", alone ? "explains" : "accounts for", whole_percent(cause.share));
-  return cause.parameters.empty() ? out + "." : out + ": " + parameters_of(cause) + ".";
+  return cause.parameters.empty() || !cause.laws.empty() || (alone && cause.parameters.size() > kInHeadline)
+             ? out + "."
+             : out + ": " + parameters_of(cause.parameters) + ".";
+}
+
+// The laws between which the log does not tell, with their numbers.
+std::string laws_sentence(const gap::GapCause& cause) {
+  if (cause.laws.empty()) {
+    return {};
+  }
+  std::vector<std::string> laws;
+  for (const gap::GapLaw& law : cause.laws) {
+    laws.push_back(effect_noun(law.effect) +
+                   (law.parameters.empty() ? "" : " (" + parameters_of(law.parameters) + ")"));
+  }
+  return fmt::format("This log does not tell by which law: {}.", core::listed(laws, ", or "));
+}
+
+// What is said of a healthy robot that the model does not fit.
+std::string misfit_sentence(const Diagnosis& d) {
+  if (!d.misfit) {
+    return {};
+  }
+  const gap::HealthyMisfit& m = *d.misfit;
+  std::string out = fmt::format("This model does not fit the healthy robot: of its efforts' mean square {} stay",
+                                percent(m.share, 2));
+  if (!m.known.empty()) {
+    std::vector<std::string> nouns;
+    std::ranges::transform(m.known, std::back_inserter(nouns), effect_noun);
+    out += " with " + core::enumerated(nouns) + " added";
+  }
+  out += ", most in the " + channel_words(m.channel) + (m.regime.empty() ? "" : " (" + m.regime + ")") + ".";
+  if (!m.helping.empty()) {
+    std::vector<std::string> nouns;
+    std::ranges::transform(m.helping, std::back_inserter(nouns), effect_noun);
+    out += " Of the catalogue " + core::listed(nouns, " or ") + " would help most, and not enough.";
+  }
+  return out;
+}
+
+// The smallest sizes of a few causes that would have been seen.
+std::string visible_sentence(const Diagnosis& d) {
+  constexpr std::array<std::string_view, 6> kTold{"coulomb", "viscous", "payload",
+                                                  "delay",   "slope",   "wheel_radius_asymmetric"};
+  std::vector<std::string> parts;
+  for (const std::string_view effect : kTold) {
+    const auto size = std::ranges::find(d.visible, effect, &gap::VisibleSize::effect);
+    if (size != d.visible.end()) {
+      parts.push_back(
+          fmt::format("{} from {}", effect_noun(effect), with_unit(number(size->size, 2), unit_of(size->unit))));
+    }
+  }
+  return parts.empty() ? std::string() : "Each of these alone would have shown: " + core::listed(parts) + ".";
+}
+
+// Causes of a headline: more than two are counted, the sentences after it name them.
+std::string few_or_count(const std::vector<std::string>& names) {
+  return names.size() > 2 ? fmt::format("{} causes", names.size()) : core::enumerated(names);
 }
 
 // The channel whose residual was largest against its signal.
@@ -98,17 +155,46 @@ std::string shrink_sentence(const Diagnosis& d) {
   return f->floor > 0.0 ? out + "; the noise floor is " + residual_size(d, *f, f->floor) + "." : out + ".";
 }
 
+// What a channel of the residual is of.
+std::string subject_words(const std::string& channel) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kSubjects{
+      {{"sum", "the driving torque"},
+       {"difference", "the turning torque"},
+       {"forward", "forward motion"},
+       {"lateral", "lateral motion"},
+       {"yaw", "turning motion"}}};
+  const auto known = std::ranges::find(kSubjects, channel, &std::pair<std::string_view, std::string_view>::first);
+  return known != kSubjects.end() ? std::string(known->second) : "the " + channel_words(channel);
+}
+
+// Where what no θ makes up is concentrated, the largest shares of all of it first.
 std::string where_sentence(const Diagnosis& d) {
-  std::vector<std::string> places;
+  constexpr std::size_t kMost = 3;
+  constexpr double kAll = 0.995, kMostly = 0.9;
+  std::vector<std::pair<double, std::string>> places;
   for (const gap::GapShare& s : d.where) {
-    if (s.kind != "channel" && s.kind != "time" && gap::is_finding(s) && places.size() < 3) {
-      places.push_back(fmt::format("{} ({} of it in {} of the {}, {})", s.regime, whole_percent(s.share),
-                                   whole_percent(s.presence), s.kind == "frequency" ? "noise" : "time",
-                                   channel_words(s.channel)));
+    if (s.kind == "channel" || s.kind == "time" || !gap::is_finding(s)) {
+      continue;
+    }
+    const auto channel = std::ranges::find_if(d.where, [&](const gap::GapShare& other) {
+      return other.kind == "channel" && other.channel == s.channel && other.space == s.space;
+    });
+    const bool band = s.kind == "frequency" && !s.regime.empty();
+    const std::string at = !band                              ? " (" + s.regime + ")"
+                           : core::is_digit(s.regime.front()) ? " at " + s.regime
+                                                              : " " + s.regime;
+    places.emplace_back(s.share * (channel == d.where.end() ? 1.0 : channel->share), subject_words(s.channel) + at);
+  }
+  std::ranges::stable_sort(places, std::ranges::greater(), &std::pair<double, std::string>::first);
+  std::vector<std::string> parts;
+  for (const auto& [share, place] : places) {
+    if (parts.size() < kMost) {
+      parts.push_back(place + " holds " + (share < kAll ? whole_percent(share) : "all"));
     }
   }
-  return places.empty() ? std::string()
-                        : "What fitting θ again cannot remove is concentrated at: " + core::enumerated(places) + ".";
+  return parts.empty() ? std::string()
+                       : fmt::format("Where: {} of {}.", core::enumerated(parts),
+                                     d.structural < kMostly * d.gap ? "what no other parameters make up" : "the gap");
 }
 
 // How far the simulator is from the robot, and the robot's own model beside it.
@@ -145,14 +231,29 @@ std::string record_sentence(const Diagnosis& d) {
   return {};
 }
 
+// Each answer by the noun of its first set; a cause of which other sets have other laws by that of its family.
+std::vector<std::string> answer_nouns(const Diagnosis& d) {
+  std::vector<std::string> nouns;
+  for (const gap::CredibleCauses& set : d.credible) {
+    if (set.answer != nouns.size()) {
+      continue;
+    }
+    std::vector<std::string> parts;
+    for (const std::string& effect : set.effects) {
+      const auto cause = std::ranges::find(d.causes, effect, &gap::GapCause::effect);
+      parts.push_back(set.answer == 0 && cause != d.causes.end() ? cause_noun(*cause) : effect_noun(effect));
+    }
+    nouns.push_back(parts.empty() ? "none" : core::listed(parts, " with "));
+  }
+  return nouns;
+}
+
 // Those that fit best; the rest of many is counted.
 std::vector<std::string> credible_names(const Diagnosis& d) {
   constexpr std::size_t kMost = 6;
-  const std::size_t all = d.credible.size(), told = all > kMost ? kMost - 1 : all;
-  std::vector<std::string> names;
-  for (std::size_t k = 0; k < told; ++k) {
-    names.push_back(effect_nouns(d.credible[k].effects));
-  }
+  std::vector<std::string> names = answer_nouns(d);
+  const std::size_t all = names.size(), told = all > kMost ? kMost - 1 : all;
+  names.resize(told);
   if (told < all) {
     names.push_back(fmt::format("one of {} others that the report lists", all - told));
   }
@@ -173,6 +274,10 @@ std::string parameter_words(std::string_view parameter) {
 std::string effect_noun(std::string_view effect) {
   const std::string noun = gap::catalogue_noun(effect);
   return noun.empty() ? spaced(effect) : noun;
+}
+
+std::string cause_noun(const gap::GapCause& cause) {
+  return cause.laws.empty() ? effect_noun(cause.effect) : gap::family_noun(cause.family);
 }
 
 std::string effect_nouns(const std::vector<std::string>& effects) {
@@ -220,7 +325,7 @@ std::string gap_verdict(const Diagnosis& d) {
   std::vector<std::string> names;
   double share = 0.0;
   for (const gap::GapCause& cause : d.causes) {
-    names.push_back(effect_noun(cause.effect));
+    names.push_back(cause_noun(cause));
     share += cause.share;
   }
   switch (d.verdict) {
@@ -233,17 +338,20 @@ std::string gap_verdict(const Diagnosis& d) {
     case GapVerdict::explained:
       return names.empty()       ? "The gap is explained."
              : names.size() == 1 ? cause_sentence(d.causes.front(), true)
-                                 : fmt::format("{} together explain {} of the gap.",
-                                               core::capital(core::enumerated(names)), whole_percent(share));
+                                 : fmt::format("{} together explain {} of the gap.", core::capital(few_or_count(names)),
+                                               whole_percent(share));
     case GapVerdict::ambiguous:
-      return d.credible.size() > 1
-                 ? fmt::format("The gap has one of {} causes, which this log cannot tell apart.", d.credible.size())
+      return gap::answers_among(d.credible) > 1
+                 ? fmt::format("The gap has one of {} causes, which this log cannot tell apart.",
+                               gap::answers_among(d.credible))
                  : "The gap has causes that this log cannot tell apart.";
     case GapVerdict::unexplained:
-      return names.empty()
+      return names.empty() && d.misfit
+                 ? "This model does not fit the healthy robot, so that this log shows no gap and no absence of one."
+             : names.empty()
                  ? "There is a gap, and no effect of the catalogue explains it."
                  : fmt::format("The gap is not explained: {} of it stays when {} {} added.", whole_percent(d.remaining),
-                               core::enumerated(names), names.size() == 1 ? "is" : "are");
+                               few_or_count(names), names.size() == 1 ? "is" : "are");
   }
   return {};
 }
@@ -258,10 +366,15 @@ std::vector<std::string> gap_sentences(const Diagnosis& d, const std::string& ne
   add(simulator_sentence(d));
   if (d.verdict == GapVerdict::no_gap) {
     add(shrink_sentence(d));
+    add(visible_sentence(d));
     add(record_sentence(d));
     return out;
   }
-  if (d.verdict == GapVerdict::ambiguous && d.credible.size() > 1) {
+  add(misfit_sentence(d));
+  if (d.verdict == GapVerdict::unexplained && d.causes.empty()) {
+    add(visible_sentence(d));
+  }
+  if (d.verdict == GapVerdict::ambiguous && gap::answers_among(d.credible) > 1) {
     add(fmt::format("It may be {}", fmt::join(credible_names(d), ", or ")) +
         ". What follows is of the first of these: it fits best, but not by more than chance.");
   }
@@ -270,14 +383,20 @@ std::vector<std::string> gap_sentences(const Diagnosis& d, const std::string& ne
       add(cause_sentence(cause, d.causes.size() == 1));
     }
   }
+  for (const gap::GapCause& cause : d.causes) {
+    add(laws_sentence(cause));
+    if (d.causes.size() == 1 && cause.laws.empty() && cause.parameters.size() > kInHeadline) {
+      add(core::capital(effect_noun(cause.effect)) + ": " + parameters_of(cause.parameters) + ".");
+    }
+  }
   add(shrink_sentence(d));
-  if (d.verdict == GapVerdict::unexplained) {
+  if (d.verdict == GapVerdict::unexplained && !(d.causes.empty() && d.misfit)) {
     add("Something acts on the robot that is in no model of the catalogue, or in one that this log does not show; the "
         "causes that are named are what helps most, not what is the matter.");
   }
   add(record_sentence(d));
   add(where_sentence(d));
-  if (d.verdict == GapVerdict::explained && d.credible.size() > 1) {
+  if (d.verdict == GapVerdict::explained && gap::answers_among(d.credible) > 1) {
     const std::vector<std::string> names = credible_names(d);
     add(fmt::format("Within the confidence of 90 % {} would do as well on this log.",
                     core::enumerated({names.begin() + 1, names.end()})));

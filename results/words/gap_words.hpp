@@ -15,6 +15,9 @@ namespace wheelwright::words {
 /// An effect as a noun: "coulomb" → "dry friction"; the identifier as words for one that is not known here.
 [[nodiscard]] std::string effect_noun(std::string_view effect);
 
+/// A cause as a noun: the effect's, or its family's where the log does not tell between laws of it ("late torque").
+[[nodiscard]] std::string cause_noun(const gap::GapCause& cause);
+
 /// Several as one: "dry friction with a dragging castor"; "none" for no effect.
 [[nodiscard]] std::string effect_nouns(const std::vector<std::string>& effects);
 

@@ -20,6 +20,7 @@ from pathlib import Path
 FAMILIES = [
     {"coulomb", "rolling_resistance", "bearing_friction"},
     {"actuator_lag", "delay", "sensor_time_offset"},
+    {"wheel_radius_asymmetric", "encoder_scale"},
 ]
 # What the nominal parameters can take up: names for the verdict of a parametric cause.
 PARAMETRIC = {"payload", "armature", "viscous", "torque_gain", "wheel_radius", "track_width", "encoder_scale"}

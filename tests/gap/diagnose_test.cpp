@@ -81,6 +81,38 @@ TEST(Diagnose, ExplainsAndSharesAddUp) {
   EXPECT_TRUE(found.looked_at[0].effects.empty());
 }
 
+// Friction that both robots have and the catalogue lacks is no noise; noise is, however much there is of it.
+TEST(Diagnose, SaysThatAModelDoesNotFitTheHealthyRobot) {
+  DiagnoseOptions few = quick();
+  few.catalogue = gap_example::only({"slope", "payload"});
+  Scenario log = noisy_scenario(robot_with("coulomb", {{"c", 1.5}}), 12);
+  Scenario before = log;
+  before.seed += 5000;
+  const auto diagnosis = [&](const DiagnoseOptions& options) {
+    Simulation real(log), healthy(before);
+    return diagnose(real, &healthy, counted_robot(), options);
+  };
+  const Diagnosis found = diagnosis(few);
+  EXPECT_EQ(found.verdict, GapVerdict::unexplained);
+  EXPECT_TRUE(found.causes.empty());
+  EXPECT_FALSE(found.record);
+  ASSERT_TRUE(found.misfit);
+  EXPECT_GT(found.misfit->share, 0.05);
+  EXPECT_LT(found.misfit->share, 1.0);
+  EXPECT_FALSE(found.misfit->regime.empty());
+  EXPECT_FALSE(found.visible.empty());
+  // With the friction in the catalogue it is learnt from the healthy log.
+  const Diagnosis whole = diagnosis(quick());
+  EXPECT_EQ(whole.verdict, GapVerdict::no_gap);
+  EXPECT_FALSE(whole.misfit);
+  EXPECT_TRUE(whole.record);
+  log.robot = before.robot = counted_robot();
+  log.sensors.effort = before.sensors.effort = 4.0;
+  const Diagnosis noisy = diagnosis(few);
+  EXPECT_EQ(noisy.verdict, GapVerdict::no_gap);
+  EXPECT_FALSE(noisy.misfit);
+}
+
 // It was counted on logs with a healthy one beside them and the catalogue whole, and says nothing of others.
 TEST(Diagnose, HasARecordWhereOneWasCounted) {
   const Scenario scenario = noisy_scenario(robot_with("coulomb", {{"c", 0.3}}), 2);

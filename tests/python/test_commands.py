@@ -259,7 +259,13 @@ class Discrimination(Commands):
                                         "encoder_counts_per_turn": 16384, "log": ["speeds", "pose"]},
                             "duration": 30, "rate": 50, "seed": 3})
         diagnosis = ww.gap(late, ww.read_robot(path("plain.yaml")), shrink=False)
-        self.assertEqual(diagnosis.verdict, "ambiguous")
+        self.assertEqual(diagnosis.verdict, "explained")
+        (cause,) = diagnosis.causes
+        self.assertEqual(cause.family, "late_torque")
+        self.assertEqual({law.effect for law in cause.laws}, {"actuator_lag", "delay"})
+        self.assertEqual(cause.laws[0].parameters.keys(), cause.parameters.keys())
+        self.assertEqual(diagnosis.visible, [])
+        self.assertIsNone(diagnosis.healthy_misfit)
         diagnosis.save(path("gap.json"))
         model = ww.read_model(model_file())
         python = ww.design(model, "discrimination", gap=diagnosis, **self.LIMITS)

@@ -55,19 +55,20 @@ class SameNumbers(unittest.TestCase):
                                             "--no-manoeuvre", "--without", "slope"))
 
     def test_gap_that_is_ambiguous(self):
-        # A late torque looks like a lagging one on a slow drive: both say which drive would tell them apart.
+        # At one heading a slope is an offset of the torque: both say which drive would tell them apart.
         truth = {"mass": 21.0, "yaw_inertia": 0.9, "viscous_linear": 4.0, "viscous_yaw": 0.145}
         plain = {"wheel_radius": 0.0975, "track_width": 0.381, "encoder_counts_per_turn": 16384, "nominal": truth}
         ww.Robot(**plain).save(path("plain.yaml"))
-        ww.simulate({"robot": {**plain, "effects": [{"effect": "delay", "T_d": 0.02}]}, "parameters": truth,
-                     "trajectory": {"kind": "multi_sine", "speed": 0.6, "yaw_rate": 1.0, "period": 14},
-                     "sensors": {"sampling": "interval", "effort": 0.05, "position": 0.002, "heading": 0.003,
+        ww.simulate({"robot": {**plain, "effects": [{"effect": "slope", "g_x": 0.2, "g_y": 0.01}]},
+                     "parameters": truth,
+                     "trajectory": {"kind": "multi_sine", "speed": 0.6, "yaw_rate": 0.05, "period": 14},
+                     "sensors": {"sampling": "interval", "effort": 0.1, "position": 0.002, "heading": 0.003,
                                  "encoder_counts_per_turn": 16384, "log": ["speeds", "pose"]},
-                     "duration": 30, "rate": 50, "seed": 3}).save(path("late.csv"))
+                     "duration": 30, "rate": 50, "seed": 3}).save(path("slope.csv"))
         plain_robot = ww.read_robot(path("plain.yaml"))
-        python = ww.gap(ww.read_log(path("late.csv"), plain_robot), plain_robot, shrink=False)
+        python = ww.gap(ww.read_log(path("slope.csv"), plain_robot), plain_robot, shrink=False)
         self.assertEqual(python.verdict, "ambiguous")
-        self.same(python.to_dict(), program("gap", path("late.csv"), "--robot", path("plain.yaml"), "--no-shrink"))
+        self.same(python.to_dict(), program("gap", path("slope.csv"), "--robot", path("plain.yaml"), "--no-shrink"))
         self.assertLessEqual({"t", "command_r", "command_l"}, set(python.next_commands))
 
     def test_design(self):

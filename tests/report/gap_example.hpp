@@ -90,6 +90,22 @@ inline Diagnosis ambiguous() {
   Diagnosis d = explained();
   d.verdict = gap::GapVerdict::ambiguous;
   d.credible.push_back({{"caster_drag"}, 1.06, 0.31});
+  d.credible.back().answer = 1;
+  return d;
+}
+
+/// Late torque, by a delay or a lag.
+inline Diagnosis late_torque() {
+  Diagnosis d = explained();
+  d.causes[0].effect = "delay";
+  d.causes[0].sentence = "The torque arrives later than it was commanded.";
+  d.causes[0].parameters = {{"T_d", "s", 0.021, 0.020, 0.022, true}};
+  d.causes[0].family = "late_torque";
+  d.causes[0].laws = {{"delay", d.causes[0].sentence, d.causes[0].parameters},
+                      {"actuator_lag",
+                       "The actuator follows its command with a first-order lag.",
+                       {{"T", "s", 0.024, 0.023, 0.025, true}}}};
+  d.credible = {{{"delay"}, 1.04, 1.0}, {{"actuator_lag"}, 1.05, 0.6}};
   return d;
 }
 
@@ -124,6 +140,15 @@ inline Diagnosis no_gap() {
   d.credible.clear();
   d.contradictions.clear();
   d.gap = d.structural = d.remaining = 0.0;
+  d.visible = {{"coulomb", "c", "N·m", 0.0213}, {"payload", "mass_kg", "kg", 0.317}, {"stribeck", "c_s", "N·m", 0.5}};
+  return d;
+}
+
+/// Efforts that no model of the healthy robot fits.
+inline Diagnosis misfit() {
+  Diagnosis d = no_gap();
+  d.verdict = gap::GapVerdict::unexplained;
+  d.misfit = gap::HealthyMisfit{"difference", 0.231, {"lateral_scrub"}, {"stribeck"}, "turning on the spot"};
   return d;
 }
 

@@ -54,6 +54,65 @@ TEST(GapWords, EachVerdictHasItsOwnWords) {
   EXPECT_TRUE(example::holds(all_sentences(nothing), {"no effect of the catalogue explains it"}));
 }
 
+TEST(GapWords, LawsOfAFamilyAreOneCause) {
+  const std::string words = all_sentences(gap_example::late_torque());
+  EXPECT_TRUE(example::holds(words, {"Late torque, which the model lacks, explains 93\u00a0% of the gap.",
+                                     "does not tell by which law: a delay of the torque (0.0210\u00a0s [",
+                                     ", or a lag of the actuators (0.0240\u00a0s ["}));
+  EXPECT_TRUE(example::lacks(words, {"one of", "would do as well"}));
+  const std::string page = gap_report(gap_example::late_torque(), "r", {});
+  EXPECT_TRUE(example::holds(page, {"Late torque", "<code>late_torque</code>", "either a lag of the actuators"}));
+}
+
+TEST(GapWords, WithoutAGapTheSmallestThatWouldHaveShown) {
+  const std::string words = all_sentences(gap_example::no_gap());
+  EXPECT_TRUE(
+      example::holds(words, {"would have shown: dry friction from 0.021\u00a0N·m, a payload from 0.32\u00a0kg."}));
+  EXPECT_TRUE(
+      example::holds(gap_report(gap_example::no_gap(), "r", {}), {"What would have been seen", "0.50\u00a0N·m"}));
+  EXPECT_TRUE(example::lacks(all_sentences(gap_example::explained()), {"would have shown"}));
+}
+
+TEST(GapWords, AModelThatDoesNotFitTheHealthyRobotIsSaidToBeNone) {
+  const std::string words = all_sentences(gap_example::misfit());
+  EXPECT_TRUE(example::holds(
+      words, {"This model does not fit the healthy robot", "mean square 23", "scrubbing of the tyres in turns",
+              "difference channel (turning on the spot)", "dry friction that fades with speed would help most"}));
+  EXPECT_TRUE(example::lacks(words, {"No gap", "were right", "no effect of the catalogue explains it"}));
+}
+
+std::size_t words_in(const std::string& sentence) {
+  return static_cast<std::size_t>(std::ranges::count(sentence, ' ')) + 1;
+}
+
+TEST(GapWords, TheFirstSentenceIsShort) {
+  Diagnosis many = gap_example::explained();
+  for (int k = 0; k < 12; ++k) {
+    many.causes[0].parameters.push_back(many.causes[0].parameters[0]);
+  }
+  for (const Diagnosis& d :
+       {gap_example::explained(), gap_example::ambiguous(), gap_example::two_causes(), gap_example::unexplained(),
+        gap_example::no_gap(), gap_example::late_torque(), gap_example::misfit(), many}) {
+    EXPECT_LE(words_in(gap_verdict(d)), 25U) << gap_verdict(d);
+  }
+  EXPECT_TRUE(example::holds(all_sentences(many), {"0.312"}));
+}
+
+// Of the sum channel's 71 % four fifths.
+TEST(GapWords, WhereSaysHowMuchOfTheGapLiesThere) {
+  Diagnosis d = gap_example::explained();
+  d.structural = d.gap;
+  EXPECT_TRUE(
+      example::holds(all_sentences(d), {"Where: the driving torque at 0.2 to 0.5 Hz holds 41\u00a0%, the driving "
+                                        "torque (reversal of the right wheel) holds 37\u00a0% and",
+                                        "holds 22\u00a0% of the gap."}));
+  d.where = {{gap::GapSpace::kinematic, "lateral", "all", "channel", 1.0, 1.0, 0.001},
+             {gap::GapSpace::kinematic, "lateral", "below 0.2 Hz", "frequency", 1.0, 0.14, 0.001}};
+  EXPECT_TRUE(example::holds(all_sentences(d), {"Where: lateral motion below 0.2 Hz holds all of the gap."}));
+  d.structural = 0.5 * d.gap;
+  EXPECT_TRUE(example::holds(all_sentences(d), {"holds all of what no other parameters make up."}));
+}
+
 TEST(GapWords, TheRecordOfSuchAnswersIsToldWhereThereIsOne) {
   Diagnosis d = gap_example::ambiguous();
   EXPECT_TRUE(example::lacks(all_sentences(d), {"withheld"}));

@@ -55,6 +55,23 @@ TEST(GapJson, NamesEveryVerdict) {
   EXPECT_EQ(to_json(report::gap_example::unexplained(), files())["verdict"], "unexplained");
 }
 
+TEST(GapJson, HasTheLawsOfAFamilyAndWhatWouldHaveBeenSeen) {
+  const Json late = to_json(report::gap_example::late_torque(), files());
+  const Json& cause = late["causes"][0];
+  EXPECT_EQ(cause["effect"], "delay");
+  EXPECT_EQ(cause["family"], "late_torque");
+  EXPECT_EQ(cause["laws"][1]["effect"], "actuator_lag");
+  EXPECT_EQ(cause["laws"][1]["parameters"]["T"]["estimate"], 0.024);
+  EXPECT_EQ(late["credible_set"][1]["effects"], Json({"actuator_lag"}));
+  EXPECT_EQ(late["credible_set"][1]["answer"], 0);
+  EXPECT_EQ(to_json(report::gap_example::ambiguous(), files())["credible_set"][1]["answer"], 1);
+  EXPECT_TRUE(late["healthy_misfit"].is_null());
+  const Json none = to_json(report::gap_example::no_gap(), files());
+  EXPECT_EQ(none["visible"][1],
+            Json({{"effect", "payload"}, {"parameter", "mass_kg"}, {"size", 0.317}, {"unit", "kg"}}));
+  EXPECT_TRUE(to_json(report::gap_example::explained(), files())["causes"][0]["family"].is_null());
+}
+
 TEST(GapJson, KeepsChannelsBandsAndFindingsInTheirOrder) {
   const Json json = to_json(report::gap_example::explained(), files());
   std::vector<std::string> regimes;
@@ -70,7 +87,11 @@ TEST(GapJson, SchemaNamesEveryKeyAndRequiresIt) {
   const Json schema = files::read_json(std::filesystem::path(WHEELWRIGHT_SOURCE_DIR) / "results" / "gap.schema.json");
   GapFiles f = files();
   f.next_manoeuvre = NextManoeuvre{"next.csv", "Turn on the spot."};
-  const Json json = to_json(report::gap_example::two_causes(), f);
+  Diagnosis diagnosis = report::gap_example::two_causes();
+  diagnosis.visible = report::gap_example::no_gap().visible;
+  diagnosis.misfit = report::gap_example::misfit().misfit;
+  diagnosis.causes[0].laws = report::gap_example::late_torque().causes[0].laws;
+  const Json json = to_json(diagnosis, f);
   const auto same_keys = [](const Json& object, const Json& rule) {
     std::set<std::string> has, known, required;
     for (const auto& [key, value] : object.items()) {
@@ -95,10 +116,12 @@ TEST(GapJson, SchemaNamesEveryKeyAndRequiresIt) {
   };
   same_keys(json, schema);
   const Json& properties = schema["properties"];
-  for (const char* key : {"causes", "credible_set", "confusable", "where", "parametric", "contradictions"}) {
+  for (const char* key : {"causes", "credible_set", "confusable", "where", "parametric", "contradictions", "visible"}) {
     ASSERT_FALSE(json[key].empty()) << key;
     same_keys(json[key][0], properties[key]["items"]);
   }
+  same_keys(json["causes"][0]["laws"][0], properties["causes"]["items"]["properties"]["laws"]["items"]);
+  same_keys(json["healthy_misfit"], properties["healthy_misfit"]);
   same_keys(json["shrink"], properties["shrink"]);
   same_keys(json["shrink"]["rollout"]["velocity_1s"], schema["definitions"]["figures"]["additionalProperties"]);
   same_keys(json["causes"][0]["parameters"]["coulomb"], schema["definitions"]["estimate"]);
