@@ -13,11 +13,11 @@ namespace {
 
 using Candidates = std::vector<IncidentCandidate>;
 
-Candidates consistent_of(const Isolation& isolation) {
+Candidates consistent_of(const Isolation& isolation, double alarm) {
   Candidates out;
   for (const FaultFinding& finding : isolation.findings) {
     if (finding.verdict == FaultFinding::Verdict::consistent) {
-      out.push_back({.finding = finding});
+      out.push_back({.finding = finding, .changes = false, .events = 1, .since = alarm});
     }
   }
   return out;
@@ -57,10 +57,10 @@ bool narrow_size(std::optional<Interval>& magnitude, const std::optional<Interva
   return both.has_value();
 }
 
-// What sums leave, alike; of a fault that `changes`, of the later event.
-void narrow_at_risk(FaultFinding& finding, const FaultFinding& later, bool changes) {
-  if (!finding.at_risk || !later.at_risk || changes) {
-    finding.at_risk = finding.at_risk && !changes ? finding.at_risk : later.at_risk;
+// What sums leave, alike.
+void narrow_at_risk(FaultFinding& finding, const FaultFinding& later) {
+  if (!finding.at_risk || !later.at_risk) {
+    finding.at_risk = finding.at_risk ? finding.at_risk : later.at_risk;
     return;
   }
   SumFinding& now = *finding.at_risk;
@@ -73,22 +73,26 @@ void narrow_at_risk(FaultFinding& finding, const FaultFinding& later, bool chang
   now.onset = onset.value_or(now.onset);
 }
 
-// What is left of a candidate when a later event allows `later` of the same kind; where they set in at two times nothing,
-// or, with `again`, the later one. A drift is another one while it grows: only its onset is compared.
-std::optional<IncidentCandidate> both(IncidentCandidate now, const FaultFinding& later, bool again) {
-  FaultFinding& finding = now.finding;
-  if (!narrow_onset(finding, later)) {
-    return again ? std::optional<IncidentCandidate>({later, true}) : std::nullopt;
+// What is left of a candidate when a later event allows `later` of the same kind. A drift is another one while it grows:
+// only its onset is compared. Where the two set in at two times nothing is left, or, with `again`, the later one; where
+// their sizes differ, the later one.
+std::optional<IncidentCandidate> both(const IncidentCandidate& now, const IncidentCandidate& later, bool again) {
+  IncidentCandidate left = now;
+  FaultFinding& finding = left.finding;
+  const bool same_onset = narrow_onset(finding, later.finding);
+  if (!same_onset && !again) {
+    return std::nullopt;
   }
-  if (finding.fault.profile.jumps()) {
-    now.changes = !narrow_size(finding.magnitude, later.magnitude) || now.changes;
-    if (now.changes) {
-      finding.magnitude = later.magnitude;
-    }
-    finding.complete = finding.complete || later.complete;
+  const bool steps = finding.fault.profile.jumps();
+  if (now.events == 0 || !same_onset || (steps && !narrow_size(finding.magnitude, later.finding.magnitude))) {
+    left = later;
+    left.changes = true;
+    return left;
   }
-  narrow_at_risk(finding, later, now.changes);
-  return now;
+  finding.complete = finding.complete || (steps && later.finding.complete);
+  narrow_at_risk(finding, later.finding);
+  ++left.events;
+  return left;
 }
 
 Candidates common(const Candidates& now, const Candidates& later, bool again) {
@@ -97,7 +101,7 @@ Candidates common(const Candidates& now, const Candidates& later, bool again) {
     const auto other = std::ranges::find(later, candidate.finding.fault.name,
                                          [](const IncidentCandidate& c) { return c.finding.fault.name; });
     if (other != later.end()) {
-      if (auto left = both(candidate, other->finding, again)) {
+      if (auto left = both(candidate, *other, again)) {
         out.push_back(std::move(*left));
       }
     }
@@ -114,7 +118,8 @@ void rank(Candidates& candidates) {
     const std::optional<Interval>& size = c.finding.magnitude;
     const double middle = size ? 0.5 * std::abs(size->lower + size->upper) : 0.0;
     const double width = !size ? 1.0 : middle > 0.0 ? (size->upper - size->lower) / middle : core::kInfinity;
-    return std::tuple(c.finding.at_risk && c.finding.at_risk->excluded, c.changes, width);
+    const bool excluded = c.finding.at_risk && c.finding.at_risk->excluded;
+    return std::tuple(excluded, c.changes, c.changes ? -static_cast<double>(c.events) : 0.0, width);
   };
   std::stable_sort(candidates.begin(), candidates.end(),
                    [&](const IncidentCandidate& a, const IncidentCandidate& b) { return key(a) < key(b); });
@@ -137,21 +142,21 @@ bool IncidentRecorder::asks(const Event& event) const {
 
 // The candidates after an event that was examined; another incident is opened where it is of another fault.
 IncidentRecorder::Outcome IncidentRecorder::take(const Event& event, const Isolation& isolation) {
-  Candidates found = consistent_of(isolation);
+  Candidates found = consistent_of(isolation, event.alarm);
   Outcome outcome{.change = Change::extended};
   if (open_) {
     Incident& now = *open_;
     // Where nothing was examined yet, nothing speaks against it.
     const bool soon = now.examined == 0 || event.start - now.end <= options_.quiet;
-    const bool nothing_yet = now.examined == now.unexplained;
     Candidates left = common(now.candidates, found, false);
     if (soon && left.empty()) {
       left = common(now.candidates, found, true);
     }
-    if (soon && (nothing_yet || found.empty())) {
-      left = nothing_yet ? found : now.candidates;
+    if (soon && left.empty()) {
+      left = found.empty() ? now.candidates : found;
       for (IncidentCandidate& candidate : left) {
         candidate.changes = candidate.changes || now.examined > 0;
+        candidate.events = found.empty() ? 0 : 1;
       }
     }
     if (soon || !left.empty()) {

@@ -6,8 +6,9 @@
 /// catalogue has. isolate() never excludes such a fault at any event, and its size and onset lie in the intervals of
 /// each. So its kind is a candidate of every event that was examined, and size and onset lie in what is common to
 /// their intervals: **of that class the true fault is never lost, whatever rows, restarts of the filter and residuals
-/// lie between the events**, and where nothing is common the cause is none of that class. What is left then
-/// (Incident::stays is false) has kinds whose size changed, or none: it proves nothing, and is said so.
+/// lie between the events**, and where nothing is common the cause is none of that class (Incident::stays is false). The
+/// candidates are then those of the last events that agree, from IncidentCandidate::since on: a fault that grew and then
+/// stayed is among them, of several faults perhaps the last. It is no proof, and is said so.
 #pragma once
 
 #include <cstddef>
@@ -21,8 +22,10 @@ namespace wheelwright::detector {
 
 /// A fault that may have caused the events of an incident that were examined.
 struct IncidentCandidate {
-  FaultFinding finding;  ///< size and onset that are left when all these events are taken together
-  bool changes = false;  ///< no one size and onset explains them all: `finding` has that of the last that it explains
+  FaultFinding finding;    ///< size and onset that are left when these events are taken together
+  bool changes = false;    ///< it explains no more than the last events, or those with another size or onset
+  std::size_t events = 1;  ///< examined ones that `finding` explains, all of them or the last; 0: not the last
+  double since = 0.0;      ///< alarm of the first of these, s
 };
 
 /// Events that one fault explains, or that came too soon one after the other to be told apart.
@@ -35,8 +38,9 @@ struct Incident {
   std::size_t unexplained = 0;  ///< of these, explained by no fault that was examined
   bool stays = true;  ///< false: proved to be no one step of the catalogue that stays (where `examined` is not 0)
   double last_examined = 0.0;  ///< alarm of the last that was isolated, s
-  /// Those that are left, ranked: first what is not excluded at the stated risk, then what needs one size only, then by
-  /// the width of the size's interval relative to its middle. The order is no proof.
+  /// Those that are left, ranked: first what is not excluded at the stated risk, then what needs one size only, then
+  /// those that change by the number of events that they explain, then by the width of the size's interval relative to
+  /// its middle. The order is no proof.
   std::vector<IncidentCandidate> candidates;
 };
 
@@ -53,7 +57,7 @@ struct IncidentOptions {
 /// An event belongs to the open incident where some candidate explains it, too, with a size and an onset that it may
 /// have in all events before. Where none does it belongs to it if it comes soon (IncidentOptions::quiet), and the
 /// incident is then none of one fault that stays: of its candidates those are kept that explain both with another size
-/// or onset, marked as changing. Where it comes later another incident is opened. An event that was not asked for
+/// or onset, and where there are none those that explain this event, marked as changing. Where it comes later another incident is opened. An event that was not asked for
 /// (asks()) always belongs to it.
 class IncidentRecorder {
  public:

@@ -80,6 +80,8 @@ Json to_json(const detector::Incident& incident) {
   for (const detector::IncidentCandidate& candidate : incident.candidates) {
     Json entry = finding_json(candidate.finding);
     entry["changes"] = candidate.changes;
+    entry["events"] = candidate.events;
+    entry["since"] = candidate.since;
     entry["sentence"] = commission::sentence(candidate.finding);
     candidates.push_back(std::move(entry));
   }

@@ -9,6 +9,7 @@
 #   tests/long.sh endurance   a day at 1 kHz, with trouble every hour (tests/campaigns/endurance.py, ten minutes)
 #   tests/long.sh faults      kills, full disks, closed streams and the like, 2,000 of them (tests/campaigns/faults.py, as root)
 #   tests/long.sh ordinary    200 logs of each kind of odd log, judged (tests/campaigns/ordinary_logs.py, hours)
+#   tests/long.sh incidents   one fault a log, and the incidents that are made of it (tests/campaigns/incidents.py, an hour)
 #   tests/long.sh coverage    lines that the tests run, by room, and those they do not (tools/coverage.py)
 #   tests/long.sh alone       every source file by itself, by clang (tools/check_alone.py, ten minutes)
 #   tests/long.sh tidy        clang-tidy (tools/check_tidy.py, half an hour)
@@ -43,6 +44,10 @@ for part in ${*:-slow campaign sanitizers}; do
     ordinary)
       tools/build.sh release wheelwright wheelwright_python
       tests/campaigns/ordinary_logs.py --threads "$jobs" --same-account --python build/python
+      ;;
+    incidents)
+      tools/build.sh release wheelwright
+      tests/campaigns/incidents.py --lost 0 0.01 0.03
       ;;
     coverage)
       tools/build.sh coverage

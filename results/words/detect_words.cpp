@@ -126,7 +126,7 @@ std::string incident_sentence(const detector::Incident& incident) {
   std::vector<std::string> faults;
   for (const detector::IncidentCandidate& candidate : incident.candidates) {
     faults.push_back(commission::sentence(candidate.finding) +
-                     (candidate.changes ? " (its size changes: that of the last event)" : ""));
+                     (candidate.changes && incident.stays ? " (its size changes: that of the last event)" : ""));
   }
   std::string text;
   if (faults.empty()) {
@@ -140,7 +140,9 @@ std::string incident_sentence(const detector::Incident& incident) {
     const bool none_at_risk = std::ranges::all_of(incident.candidates, [](const detector::IncidentCandidate& c) {
       return c.finding.at_risk && c.finding.at_risk->excluded;
     });
-    text = (!incident.stays ? "no one fault that stays explains all of this; one that changes may be: "
+    text = (!incident.stays ? fmt::format("no one fault that stays explains all of this: several faults, or one that "
+                                          "grows; from the event at {:.2f} s on it may be: ",
+                                          incident.candidates.front().since)
             : none_at_risk  ? "at the stated risk no fault that was examined, each as one that stays; for certain not "
                               "excluded: "
                             : "") +

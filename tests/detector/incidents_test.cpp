@@ -102,8 +102,18 @@ TEST(Incidents, WhatNoOneFaultThatStaysExplainsIsSaidSo) {
   EXPECT_EQ(recorder.open()->candidates[0].finding.fault.name, "bias");
   EXPECT_EQ(recorder.open()->candidates[0].finding.onset.lower, 11.5) << "of the last event that it explains";
   EXPECT_FALSE(recorder.add(event_at(14.0), &third).closed);
-  EXPECT_TRUE(recorder.open()->candidates.empty());
+  ASSERT_EQ(recorder.open()->candidates.size(), 1u);
+  EXPECT_EQ(recorder.open()->candidates[0].finding.fault.name, "right");
+  EXPECT_TRUE(recorder.open()->candidates[0].changes);
+  EXPECT_EQ(recorder.open()->candidates[0].since, 14.0);
   EXPECT_EQ(recorder.open()->events, 3u);
+  // From there on events agree again.
+  const Isolation fourth = of({may_be("right", {0.15, 0.3}, {13.0, 13.0}, true)});
+  recorder.add(event_at(16.0), &fourth);
+  EXPECT_FALSE(recorder.open()->stays);
+  EXPECT_EQ(recorder.open()->candidates[0].finding.magnitude, (Interval{0.15, 0.2}));
+  EXPECT_EQ(recorder.open()->candidates[0].events, 2u);
+  EXPECT_EQ(recorder.open()->candidates[0].since, 14.0);
 }
 
 TEST(Incidents, AnEventOfTheSameFaultGoesOnAfterAGap) {
