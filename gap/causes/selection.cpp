@@ -121,10 +121,10 @@ class Selector {
     if (!best.members.empty()) {
       rivals = rivals_of(best, levels[best.members.size()]);
     }
-    add_parametric(result, rivals, nominal_trusted);
+    const bool explanation = add_parametric(result, rivals, nominal_trusted);
     result.left = result.structural.held_out_error - floor_;
     result.any_cause = !result.all.members.empty() || result.theta_moved;
-    result.reaches_floor = tolerable(result) && !arbitrary(result.credible);
+    result.reaches_floor = explanation && tolerable(result);
     return result;
   }
 
@@ -591,7 +591,9 @@ class Selector {
 
   [[nodiscard]] bool tolerable(const Selection& result) const { return result.left <= tolerable_remainder(result); }
 
-  void add_parametric(Selection& result, const std::vector<CauseSet>& structural_rivals, bool nominal_trusted) const {
+  // Returns false where the causes are a fit and no explanation: by all credible sets, those that are left out of the
+  // answer among them.
+  bool add_parametric(Selection& result, const std::vector<CauseSet>& structural_rivals, bool nominal_trusted) const {
     std::vector<CauseSet> structural = structural_rivals;
     if (structural.empty()) {
       structural.push_back(result.structural);
@@ -660,6 +662,7 @@ class Selector {
       }
     }
     confide(result, fewest);
+    const bool a_fit = arbitrary(result.credible);
     leave_out_needless(result, rivals, nominal_trusted);
     if (!result.credible.empty() && result.credible.front().set.members != result.all.members) {
       const auto of_first = [&](const Rival& rival) {
@@ -668,6 +671,7 @@ class Selector {
       choose(result, *std::ranges::find_if(rivals, of_first), structural, nominal_trusted);
     }
     leave_out_trifles(result, nominal_trusted);
+    return !a_fit;
   }
 
   [[nodiscard]] const CauseSet& simplest_of(const std::vector<CauseSet>& sets) const {
