@@ -16,6 +16,7 @@
 #include "commission/fit.hpp"
 #include "commission/noise_budget.hpp"
 #include "commission/pose_origin.hpp"
+#include "commission/pose_timing.hpp"
 #include "commission/setting_rows.hpp"
 #include "commission/speed_unit.hpp"
 #include "core/check.hpp"
@@ -381,7 +382,7 @@ std::vector<KinematicParameter> parameters_of(const Frame& s, const OdometryFit&
   return all;
 }
 
-std::string message_of(const Frame& s, const KinematicCommissioning& r) {
+std::string message_of(const Frame& s, const KinematicCommissioning& r, const std::optional<PoseTiming>& shift) {
   if (r.status == Status::nothing) {
     return "no kinematic residual: no wheel radii and track width within the prior explain the pose";
   }
@@ -391,13 +392,13 @@ std::string message_of(const Frame& s, const KinematicCommissioning& r) {
                                                          : "the gyro",
                                  s.window);
   const auto estimated = std::ranges::count(r.noise, core::NoiseOrigin::estimated, &OutputNoise::origin);
-  if (r.shift) {
+  if (shift) {
     text += fmt::format(
         "; by the declared noise it comes {:.2g} ± {:.1g} s {} them (95 %; speeds stamped at the end of their "
         "interval, "
         "clocks that differ and wheels that slip with the acceleration look like that), so the bounds are extrapolated "
         "from the residuals of this log",
-        std::abs(r.shift->delay), 2.0 * r.shift->standard_error, r.shift->delay > 0.0 ? "after" : "before");
+        std::abs(shift->delay), 2.0 * shift->standard_error, shift->delay > 0.0 ? "after" : "before");
   } else if (r.declared_too_small) {
     text +=
         "; no wheel radii explain the pose within the declared noise (wheels that slip in turns, a pose beside the "
@@ -522,13 +523,16 @@ KinematicCommissioning commissioned_as(LogSource& log, const Robot& robot,
   result.far_from_nominal = widen(s, *fit, options.radius_share);
   result.prior = s.prior;
   const bool any_declared = std::ranges::find(s.is_declared, true) != s.is_declared.end();
-  result.shift = any_declared ? told_timing(s, *fit) : std::nullopt;
+  const std::optional<PoseTiming> shift = any_declared ? told_timing(s, *fit) : std::nullopt;
+  if (shift) {
+    result.delay = shift->delay;
+  }
   BoundedSet bounded;
-  if (!result.shift) {
+  if (!shift) {
     result.noise = output_noise(s, *fit);
     bounded = bounded_set(s, Part::everything, *fit, result.noise);
   }
-  if (result.shift || (any_declared && bounded.set.status == FeasibleSet::Status::empty)) {
+  if (shift || (any_declared && bounded.set.status == FeasibleSet::Status::empty)) {
     result.declared_too_small = true;
     s.declared = {};
     s.is_declared.assign(s.is_declared.size(), false);
@@ -542,7 +546,7 @@ KinematicCommissioning commissioned_as(LogSource& log, const Robot& robot,
   result.upper = bounded.set.upper;
   if (bounded.set.status == FeasibleSet::Status::empty) {
     result.status = Status::nothing;
-    result.message = message_of(s, result);
+    result.message = message_of(s, result, shift);
     return result;
   }
   const bool partial = std::ranges::any_of(
@@ -558,7 +562,7 @@ KinematicCommissioning commissioned_as(LogSource& log, const Robot& robot,
                                           with_noise(s, result.noise, RowUse::driving)};
   tell_declared(s, result.model->estimate, result.noise);
   validate_held_out(s, result);
-  result.message = message_of(s, result) + (origin.sentence.empty() ? "" : "; " + origin.sentence);
+  result.message = message_of(s, result, shift) + (origin.sentence.empty() ? "" : "; " + origin.sentence);
   log.rewind();
   return result;
 }

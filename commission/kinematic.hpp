@@ -12,7 +12,6 @@
 
 #include "bounds/feasible_set.hpp"
 #include "commission/output_noise.hpp"
-#include "commission/pose_timing.hpp"
 #include "commission/survey.hpp"
 #include "commission/validation.hpp"
 #include "core/log.hpp"
@@ -66,7 +65,8 @@ struct KinematicCommissioning {
   std::size_t rows = 0;                       ///< that the set is made of
   bool declared_too_small = false;  ///< no parameters explain the log within the declared noise, or the pose or gyro
                                     ///< comes at another time than the wheels: the noise was estimated
-  std::optional<PoseTiming> shift;  ///< between pose or gyro and wheels, where noise is declared and the log tells one
+  std::optional<double> delay;      ///< s, by which pose or gyro are later than the wheels, where noise is declared and
+                                    ///< the log tells one; negative: earlier
   double raise = 1.0;               ///< an estimated bound was raised by this, so that the prior box explains the log
 };
 
@@ -87,12 +87,12 @@ struct KinematicCommissionOptions {
 /// Noise: where position and heading (the latter suffices for the output yaw) and the motion (noise_budget.hpp) are
 /// declared, bounds are the sensors', derived as OdometryFilter states, with the largest acceleration that the log
 /// shows for what happens between samples; of the gyro, where its noise and `limits: acceleration` are declared.
-/// Elsewhere ē is extrapolated from the residuals. Where nothing explains the log within the declared noise (wheels slip
-/// a little in every turn, the pose's point is off the axle), or a pose or gyro is late or early against the wheels
-/// (PoseTiming::told), all outputs fall back to the extrapolated bound, and the message says so. Of speeds in whole
-/// multiples of a unit (speed_unit.hpp) of which neither the robot file nor the log says that they were cut off, the
-/// intervals hold the parameters of both readings; the model is that of rounded ones. Throws InvalidArgument for options
-/// out of range.
+/// Elsewhere ē is extrapolated from the residuals. Where nothing explains the log within the declared noise (wheels
+/// slip a little in every turn, the pose's point is off the axle), or a pose or gyro is late or early against the
+/// wheels (PoseTiming::told), all outputs fall back to the extrapolated bound, and the message says so. Of speeds in
+/// whole multiples of a unit (speed_unit.hpp) of which neither the robot file nor the log says that they were cut off,
+/// the intervals hold the parameters of both readings; the model is that of rounded ones. Throws InvalidArgument for
+/// options out of range.
 [[nodiscard]] KinematicCommissioning commission_kinematics(
     LogSource& log, const Robot& robot, const std::optional<filter::OdometryMeasurement>& measurement,
     const Survey& survey, const KinematicCommissionOptions& options = {});

@@ -73,9 +73,9 @@ void narrow_at_risk(FaultFinding& finding, const FaultFinding& later) {
   now.onset = onset.value_or(now.onset);
 }
 
-// What is left of a candidate when a later event allows `later` of the same kind. A drift is another one while it grows:
-// only its onset is compared. Where the two set in at two times nothing is left, or, with `again`, the later one; where
-// their sizes differ, the later one.
+// What is left of a candidate when a later event allows `later` of the same kind. A drift is another one while it
+// grows: only its onset is compared. Where the two set in at two times nothing is left, or, with `again`, the later
+// one; where their sizes differ, the later one.
 std::optional<IncidentCandidate> both(const IncidentCandidate& now, const IncidentCandidate& later, bool again) {
   IncidentCandidate left = now;
   FaultFinding& finding = left.finding;

@@ -4,11 +4,11 @@
 ///
 /// The class of faults behind it: **one cause, a step that stays**, of one size from one onset on, of a kind that the
 /// catalogue has. isolate() never excludes such a fault at any event, and its size and onset lie in the intervals of
-/// each. So its kind is a candidate of every event that was examined, and size and onset lie in what is common to
-/// their intervals: **of that class the true fault is never lost, whatever rows, restarts of the filter and residuals
-/// lie between the events**, and where nothing is common the cause is none of that class (Incident::stays is false). The
-/// candidates are then those of the last events that agree, from IncidentCandidate::since on: a fault that grew and then
-/// stayed is among them, of several faults perhaps the last. It is no proof, and is said so.
+/// each. So its kind is a candidate of every event that was examined, and size and onset lie in what is common to their
+/// intervals: **of that class the true fault is never lost, whatever rows, restarts of the filter and residuals lie
+/// between the events**, and where nothing is common the cause is none of that class (Incident::stays is false). The
+/// candidates are then those of the last events that agree, from IncidentCandidate::since on: a fault that grew and
+/// then stayed is among them, of several faults perhaps the last. It is no proof, and is said so.
 #pragma once
 
 #include <cstddef>
@@ -57,8 +57,8 @@ struct IncidentOptions {
 /// An event belongs to the open incident where some candidate explains it, too, with a size and an onset that it may
 /// have in all events before. Where none does it belongs to it if it comes soon (IncidentOptions::quiet), and the
 /// incident is then none of one fault that stays: of its candidates those are kept that explain both with another size
-/// or onset, and where there are none those that explain this event, marked as changing. Where it comes later another incident is opened. An event that was not asked for
-/// (asks()) always belongs to it.
+/// or onset, and where there are none those that explain this event, marked as changing. Where it comes later another
+/// incident is opened. An event that was not asked for (asks()) always belongs to it.
 class IncidentRecorder {
  public:
   /// What an event did.

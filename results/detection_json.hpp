@@ -39,7 +39,8 @@ namespace wheelwright::results {
 /// Adds the incidents, in their order, to a detection as JSON.
 void add_incidents(Json& detection, const std::vector<detector::Incident>& incidents);
 
-/// Adds to a detection with alarms whether other constant parameters explain them all, and which: null where they do not.
+/// Adds to a detection with alarms whether other constant parameters explain them all, and which: null where they do
+/// not.
 void add_other_parameters(Json& detection, const std::optional<commission::OtherParameters>& other);
 
 /// Adds to a detection why its log as a whole was not decided on (words::why_not_decided()), and the share of the rows

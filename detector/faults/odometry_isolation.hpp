@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// \file
-/// Fault isolation by the kinematic residual, and by both residuals together. As isolation.hpp, and **of faults that are
-/// steps and stay**.
+/// Fault isolation by the kinematic residual, and by both residuals together. As isolation.hpp, and **of faults that
+/// are steps and stay**.
 ///
 /// Rows of the kinematic residual are sums over a window [t_0, t] of what wheels rolled (odometry_filter.hpp). For a
-/// fault that set in at T the displacement is Σ E_j (Δφ_j + κ s q_j) r/2 + κ Σ s (E_j a_1 + E_j⊥ d) h_j, the turn alike,
-/// with q = K Δφ in joints (odometry_faults.hpp): the parts of the fault are sums from max(t_0, T) on. With T in
+/// fault that set in at T the displacement is Σ E_j (Δφ_j + κ s q_j) r/2 + κ Σ s (E_j a_1 + E_j⊥ d) h_j, the turn
+/// alike, with q = K Δφ in joints (odometry_faults.hpp): the parts of the fault are sums from max(t_0, T) on. With T in
 /// [t_a, t_b], t_b < t_s, they are those from max(t_0, t_s) on, and for the steps between max(t_0, t_a) and t_s no more
-/// than the sum of their sizes. E_j are the measured headings', so that they are the faulty robot's own; K of a measured
-/// way has the share of its errors that odometry_faults.hpp counts. A fault of an encoder is one of the motion of what it
-/// shows (onset_rows.hpp).
+/// than the sum of their sizes. E_j are the measured headings', so that they are the faulty robot's own; K of a
+/// measured way has the share of its errors that odometry_faults.hpp counts. A fault of an encoder is one of the motion
+/// of what it shows (onset_rows.hpp).
 ///
 /// A fault that leaves no trace here has the rows of a healthy robot. Where these do not explain the window, it is
 /// excluded; where they do, nothing is said of its size and onset. So **what the kinematic residual does not show
@@ -48,8 +48,8 @@ namespace wheelwright::detector {
 
 /// Takes from `isolation` what `other`, of the other residual about the same alarm and of the same faults in the same
 /// order, does not leave: a fault that either excludes is excluded, and size and onset are what both leave (onsets to
-/// within `slack` s, by which the residuals' instants may be apart). A fault that only `other` examined, and that leaves
-/// a trace there, takes its finding.
+/// within `slack` s, by which the residuals' instants may be apart). A fault that only `other` examined, and that
+/// leaves a trace there, takes its finding.
 void narrow_by(Isolation& isolation, const Isolation& other, double slack);
 
 }  // namespace wheelwright::detector

@@ -82,8 +82,8 @@ struct Measurement {
   [[nodiscard]] std::vector<std::string> columns() const;
 };
 
-/// `speed` with half of the unit given back that it was cut off by; as it is where there is no `cut`, and at 0 between two
-/// signs.
+/// `speed` with half of the unit given back that it was cut off by; as it is where there is no `cut`, and at 0 between
+/// two signs.
 [[nodiscard]] double uncut(double speed, const std::optional<model::SpeedCut>& cut);
 
 /// Finds how `log` measures `robot`: angles where the log has them, else speeds; for order 2 and speed_source automatic

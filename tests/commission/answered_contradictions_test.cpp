@@ -400,8 +400,8 @@ TEST(AnsweredContradiction, HeldOutRowsOutsideTheThresholdsAreTold) {
   EXPECT_FALSE(contradictions_in_result(result, setting, 1.0).at(0).withdraws);
 }
 
-// Some seconds of a block that is held out are noisier than all others: what is learnt of the others is raised, and only
-// a noise of another kind withdraws the model.
+// Some seconds of a block that is held out are noisier than all others: what is learnt of the others is raised, and
+// only a noise of another kind withdraws the model.
 TEST(AnsweredContradiction, LearntNoiseIsRaisedByWhatWasHeldOut) {
   const Scenario s = learnt_drive(21);
   const Eigen::VectorXd truth = sim::true_parameters(s, model::make_model(s.robot));

@@ -120,8 +120,8 @@ TEST(Kinematic, APoseAtAnotherTimeThanTheWheelsTakesTheDeclaredNoiseAway) {
     const KinematicCommissioning result = commission_robot(source, s.robot).kinematic;
     ASSERT_EQ(result.status, Status::done) << result.message;
     EXPECT_TRUE(result.declared_too_small);
-    ASSERT_TRUE(result.shift.has_value());
-    EXPECT_NEAR(result.shift->delay, lag, 0.3 * std::abs(lag));
+    ASSERT_TRUE(result.delay.has_value());
+    EXPECT_NEAR(*result.delay, lag, 0.3 * std::abs(lag));
     EXPECT_THAT(result.message, HasSubstr(lag > 0.0 ? "s after them" : "s before them"));
   }
 }
