@@ -24,7 +24,6 @@
 #include "core/statistics.hpp"
 #include "detector/threshold.hpp"
 #include "identify/least_squares.hpp"
-#include "model/filter/encoder.hpp"
 #include "model/filter/row_stream.hpp"
 
 namespace wheelwright::commission {
@@ -280,7 +279,7 @@ std::optional<PoseTiming> told_timing(const Frame& s, const OdometryFit& fit) {
   constexpr std::size_t kRows = 60000;
   filter::OdometryRows stream = make_rows(s, s.declared);
   const auto timing = pose_timing(first_rows(stream, kRows), fit.squares.estimate, weights_of(fit.residuals),
-                                  s.measurement.nominal_step);
+                                  s.measurement.nominal_step, s.measurement.position ? 2 : 0);
   return timing && timing->told(s.measurement.nominal_step) ? timing : std::nullopt;
 }
 
@@ -467,7 +466,7 @@ std::optional<model::SpeedCut> open_cut(LogSource& log, const Robot& robot, cons
     const auto rank = static_cast<std::size_t>(kTop * static_cast<double>(sizes.size()));
     const double top = sizes.empty() ? 0.0 : core::order_statistic(std::move(sizes), rank);
     const double found = top > 0.0 ? unit_of_speeds(of_wheel, top) : 0.0;
-    if (found > kCoarseUnit * top && !filter::find_encoder(of_wheel, m.nominal_step)) {
+    if (found > kCoarseUnit * top) {
       unit = std::max(unit, found);
     }
   }

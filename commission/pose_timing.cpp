@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "commission/pose_timing.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "commission/contradiction_search.hpp"
 #include "identify/least_squares.hpp"
@@ -13,21 +15,26 @@ bool PoseTiming::told(double step) const {
 }
 
 std::optional<PoseTiming> pose_timing(const core::RegressionBlock& rows, const Eigen::VectorXd& theta,
-                                      const Eigen::VectorXd& weights, double step) {
-  constexpr double kHole = 1.75;  // steps
+                                      const Eigen::VectorXd& weights, double step, std::size_t positions) {
+  constexpr double kReach = 0.1;  // s, to either side: over less the slope is that of the encoders' counts
+  constexpr double kHole = 0.75;  // steps more than there should be
+  const auto reach = static_cast<std::size_t>(std::max(1.0, std::round(kReach / step)));
   const auto n = static_cast<Eigen::Index>(rows.outputs), p = static_cast<Eigen::Index>(rows.parameters);
   const Eigen::VectorXd modelled = rows.Y * theta;
   core::RegressionBlock shifted;
   shifted.resize(rows.instants(), rows.outputs, rows.parameters + 1);
   std::size_t used = 0;
-  for (std::size_t k = 1; k + 1 < rows.instants(); ++k) {
-    if (rows.t[k] - rows.t[k - 1] > kHole * step || rows.t[k + 1] - rows.t[k] > kHole * step) {
+  const auto beside = static_cast<Eigen::Index>(reach) * n;
+  for (std::size_t k = reach; k + reach < rows.instants(); ++k) {
+    const double seconds = rows.t[k + reach] - rows.t[k - reach];
+    if (seconds > (2.0 * static_cast<double>(reach) + kHole) * step) {
       continue;
     }
     const Eigen::Index from = static_cast<Eigen::Index>(k) * n, to = static_cast<Eigen::Index>(used) * n;
     shifted.Y.block(to, 0, n, p) = rows.Y.middleRows(from, n);
     shifted.Y.col(p).segment(to, n) =
-        (modelled.segment(from - n, n) - modelled.segment(from + n, n)) / (rows.t[k + 1] - rows.t[k - 1]);
+        (modelled.segment(from - beside, n) - modelled.segment(from + beside, n)) / seconds;
+    shifted.Y.col(p).segment(to, static_cast<Eigen::Index>(positions)).setZero();
     shifted.y.segment(to, n) = rows.y.segment(from, n);
     shifted.t[used] = rows.t[k];
     shifted.sample[used++] = rows.sample[k];

@@ -3,6 +3,7 @@
 /// Shift in time between a pose or gyro and the wheels.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 
 #include <Eigen/Core>
@@ -24,11 +25,12 @@ struct PoseTiming {
 };
 
 /// The shift that explains `rows` of OdometryFilter best, to the first order and together with their parameters: a pose
-/// that is λ late shows y(t) = Y(t − λ)θ ≈ Yθ − λẎθ, with the slope Ẏθ of central differences of neighbouring instants,
-/// whose segments end where two are further apart than 1.75 `step`s. `theta` (p): the parameters by which the slope is
-/// taken; `weights`: one for each output. Nothing where fewer than kFewestInstants instants have both neighbours, or
-/// the slope shows nothing of its own.
+/// that is λ late shows y(t) = Y(t − λ)θ ≈ Yθ − λẎθ, with the slope Ẏθ of central differences over 0.1 s (and a `step`
+/// at least) to either side, where no instant is missing. `theta` (p): the parameters by which the slope is taken;
+/// `weights`: one for each output. It is told by the turning alone: of the first outputs, `positions` of them, the
+/// direction of motion is the pose's own, as late as what it is compared with. Nothing where fewer than kFewestInstants instants have a slope, or it shows nothing
+/// of its own.
 [[nodiscard]] std::optional<PoseTiming> pose_timing(const core::RegressionBlock& rows, const Eigen::VectorXd& theta,
-                                                    const Eigen::VectorXd& weights, double step);
+                                                    const Eigen::VectorXd& weights, double step, std::size_t positions);
 
 }  // namespace wheelwright::commission
