@@ -28,8 +28,8 @@ struct PoseTiming {
 /// that is λ late shows y(t) = Y(t − λ)θ ≈ Yθ − λẎθ, with the slope Ẏθ of central differences over 0.1 s (and a `step`
 /// at least) to either side, where no instant is missing. `theta` (p): the parameters by which the slope is taken;
 /// `weights`: one for each output. It is told by the turning alone: of the first outputs, `positions` of them, the
-/// direction of motion is the pose's own, as late as what it is compared with. Nothing where fewer than kFewestInstants instants have a slope, or it shows nothing
-/// of its own.
+/// direction of motion is the pose's own, as late as what it is compared with. Nothing where fewer than kFewestInstants
+/// instants have a slope, or it shows nothing of its own.
 [[nodiscard]] std::optional<PoseTiming> pose_timing(const core::RegressionBlock& rows, const Eigen::VectorXd& theta,
                                                     const Eigen::VectorXd& weights, double step, std::size_t positions);
 
