@@ -213,9 +213,8 @@ std::string shift_words(const Setting& s, const EffortTiming& timing) {
       late - 5.0 * timing.standard_error, late + 5.0 * timing.standard_error);
   if (timing.delay < 0.0 && s.measurement.hold == Hold::first_order && half < kManyStepsOff) {
     return "that is half a step: speeds that are differenced backwards, or averaged over two samples, are stamped half "
-           "a "
-           "step late (stamp them in the middle of their interval, or log angles), and efforts that are held commands "
-           "want `hold: zero_order`; " +
+           "a step late (stamp them in the middle of their interval, or log angles), and efforts that are held "
+           "commands want `hold: zero_order`; " +
            declare;
   }
   if (timing.delay > 0.0 && s.measurement.hold == Hold::zero_order && half < kManyStepsOff) {

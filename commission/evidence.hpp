@@ -21,9 +21,9 @@ struct Explained {
   Eigen::VectorXd in_doubt;  ///< by what motion, friction and efforts may do between samples, and by signs that samples
                              ///< leave open: that moves least squares whatever the noise is like
   Eigen::VectorXd noise;     ///< by noise inside its declared bounds with the worst of all shapes and signs
-  double shift_by_chance =
-      0.0;  ///< s, what is left of `in_doubt` of the shift where what happens between samples in one
-            ///< memory of the filter has no regard to the next: three standard deviations
+  /// s, what is left of `in_doubt` of the shift where what happens between samples in one memory of the filter has no
+  /// regard to the next: three standard deviations.
+  double shift_by_chance = 0.0;
 };
 
 /// Explained for least squares' estimate of each parameter (p entries) and of a constant shift of the efforts (the last

@@ -394,9 +394,8 @@ std::string message_of(const Frame& s, const KinematicCommissioning& r, const st
   if (shift) {
     text += fmt::format(
         "; by the declared noise it comes {:.2g} ± {:.1g} s {} them (95 %; speeds stamped at the end of their "
-        "interval, "
-        "clocks that differ and wheels that slip with the acceleration look like that), so the bounds are extrapolated "
-        "from the residuals of this log",
+        "interval, clocks that differ and wheels that slip with the acceleration look like that), so the bounds are "
+        "extrapolated from the residuals of this log",
         std::abs(shift->delay), 2.0 * shift->standard_error, shift->delay > 0.0 ? "after" : "before");
   } else if (r.declared_too_small) {
     text +=
