@@ -106,20 +106,37 @@ TEST(PoseAtRisk, TheSetHoldsTheTruthAndIsSharper) {
   }
 }
 
+TEST(PoseAtRisk, HonestLogsAreTakenForLateOnlyAtTheRiskOfIt) {
+  // More than five of 72 have a chance below 1e-4 where each has 0.01 (kRiskOfDoubt).
+  std::size_t told = 0;
+  for (const PoseLaw law : {PoseLaw::uniform, PoseLaw::gambler, PoseLaw::together, PoseLaw::alike}) {
+    for (const double correlation : {0.5, 2.0}) {
+      for (std::uint64_t seed = 1; seed <= 9; ++seed) {
+        ExactUnicycle robot;
+        robot.law = law;
+        robot.correlation = correlation;
+        told += guaranteed(robot, seed).delay ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_LE(told, 5U);
+}
+
 TEST(PoseAtRisk, ALogThatContradictsTheAssumptionIsToldSo) {
+  constexpr std::uint64_t kSeed = 2;  // of 1 the pose seems 4 ms early, by chance
   ExactUnicycle robot;
   robot.seconds = 60.0;
   robot.law = PoseLaw::together;
   robot.correlation = 2.0;
   ExactUnicycle declared = robot;
   declared.correlation = 0.0;
-  const KinematicCommissioning wide = guaranteed(robot, 1);
+  const KinematicCommissioning wide = guaranteed(robot, kSeed);
   ASSERT_TRUE(wide.model) << wide.message;
-  const PoseAtRisk result = said(declared, drive(robot, 1), *wide.model);
+  const PoseAtRisk result = said(declared, drive(robot, kSeed), *wide.model);
   EXPECT_EQ(result.verdict, AssumptionVerdict::fails);
   EXPECT_FALSE(result.model);
   EXPECT_FALSE(result.detail.empty());
-  const PoseAtRisk allowed = said(robot, drive(robot, 1), *wide.model);
+  const PoseAtRisk allowed = said(robot, drive(robot, kSeed), *wide.model);
   EXPECT_EQ(allowed.verdict, AssumptionVerdict::holds) << allowed.detail;
 }
 
