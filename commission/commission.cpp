@@ -430,9 +430,8 @@ std::string default_prior_in_the_way(const Setting& s, const Commissioning& resu
   return {};
 }
 
-bool holds_shift(const std::vector<LogContradiction>& contradictions) {
-  return std::ranges::find(contradictions, LogContradiction::Kind::effort_timing, &LogContradiction::kind) !=
-         contradictions.end();
+bool holds(const std::vector<LogContradiction>& contradictions, LogContradiction::Kind kind) {
+  return std::ranges::find(contradictions, kind, &LogContradiction::kind) != contradictions.end();
 }
 
 // A model that the log contradicts is not published.
@@ -649,6 +648,15 @@ FailedTrial failed_trial(const Commissioning& result) {
   return trial;
 }
 
+// Efforts late by something of which the log leaves `open`.
+Robot with_open_timing(Robot robot, const Interval& open) {
+  constexpr double kPerSecond = 1e4;  // rounded outward, for people to copy
+  robot.effort_delay = {std::min(robot.effort_delay.lower, std::floor(kPerSecond * open.lower) / kPerSecond),
+                        std::max(robot.effort_delay.upper, std::ceil(kPerSecond * open.upper) / kPerSecond)};
+  robot.effort_time_origin = model::EffortTimeOrigin::found;
+  return robot;
+}
+
 Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionOptions& options,
                            const FailedTrial& trial) {
   Commissioning result;
@@ -678,6 +686,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   if (learnt.signals.timing) {
     result.effort_shift = learnt.signals.timing->delay;
     result.effort_shift_told = told_shift(*learnt.signals.timing, s.survey.median_step);
+    result.effort_shift_open = learnt.signals.timing->open;
   }
   result.feasible = std::move(bounded.result.set);
   result.dropped = std::move(bounded.result.dropped);
@@ -695,7 +704,8 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   if (result.feasible.status == FeasibleSet::Status::empty) {
     tell(options, "measuring the contradiction", 0.7);
     const auto& timing = learnt.signals.timing;
-    if (timing && looks_shifted(*timing, s.survey.median_step) && !holds_shift(result.contradictions)) {
+    if (timing && looks_shifted(*timing, s.survey.median_step) &&
+        !holds(result.contradictions, LogContradiction::Kind::effort_timing)) {
       result.contradictions.push_back(shift_finding(log, s, fit, *timing));
     }
     result.minimax = needed_noise(log, s, result, options.outliers);
@@ -724,7 +734,7 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   const HeldOut held_out = learnt.held_out ? *learnt.held_out : try_held_out(log, s, options, trial.raises);
   result.validation = held_out.validation;
   result.polytope_over_box = held_out.polytope_over_box;
-  for (LogContradiction& found : contradictions_in_result(result, s, bounded.raised)) {
+  for (LogContradiction& found : contradictions_in_result(result, s, learnt.signals.timing, bounded.raised)) {
     result.contradictions.push_back(std::move(found));
   }
   std::ranges::copy(trial.found, std::back_inserter(result.contradictions));
@@ -759,8 +769,18 @@ KinematicCommissionOptions kinematic_options(const Robot& robot, const Commissio
 
 Commissioning commission_robot(LogSource& log, const Robot& robot, const CommissionOptions& options) {
   Commissioning result = commissioned(log, robot, options, {});
+  std::optional<Robot> doubted;
+  if (holds(result.contradictions, LogContradiction::Kind::timing_open)) {
+    doubted = with_open_timing(robot, result.effort_shift_open);
+    Commissioning held = commissioned(log, *doubted, options, {});
+    if (held.status != Commissioning::Status::empty && !withdrawn(held)) {
+      result = std::move(held);
+    } else {
+      doubted.reset();
+    }
+  }
   if (const FailedTrial trial = failed_trial(result); !trial.raises.empty()) {
-    Commissioning raised = commissioned(log, robot, options, trial);
+    Commissioning raised = commissioned(log, doubted.value_or(robot), options, trial);
     if (!withdrawn(raised)) {
       result = std::move(raised);
     }

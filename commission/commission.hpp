@@ -88,6 +88,7 @@ struct Commissioning {
                          ///< raised for it not to be (those on the motion kept), up to 0.05 %; else 0
   std::optional<double> effort_shift;  ///< s, by which the efforts seem late against the motion
   double effort_shift_told = 0.0;      ///< s, a shift beyond what is declared that would have been told
+  Interval effort_shift_open{};        ///< s, the shifts that the log does not exclude at a risk of 1 %
   Premises premises;                   ///< what statistics say of constancy, offsets and friction
   LittleLearned little;
   std::vector<LogContradiction> contradictions;  ///< found whatever the status; one that withdraws leaves no model

@@ -21,6 +21,7 @@ struct LogContradiction {
                        ///< not
     effort_unrelated,  ///< an effort that motion does not explain at all
     effort_timing,     ///< efforts late or early against the motion, beyond what is declared
+    timing_open,       ///< a shift of the efforts that the log does not exclude would leave the intervals
     wheels_disagree,   ///< the efforts of two joints do not show one and the same mass
     wrong_sign,        ///< a quantity that cannot be negative is, significantly
     dry_friction,      ///< the efforts follow the sign of the motion, and the model has no dry friction

@@ -32,6 +32,7 @@ std::string_view to_string(LogContradiction::Kind kind) {
     case LogContradiction::Kind::stamps_scatter: return "stamps_scatter";
     case LogContradiction::Kind::effort_unrelated: return "effort_unrelated";
     case LogContradiction::Kind::effort_timing: return "effort_timing";
+    case LogContradiction::Kind::timing_open: return "timing_open";
     case LogContradiction::Kind::wheels_disagree: return "wheels_disagree";
     case LogContradiction::Kind::wrong_sign: return "wrong_sign";
     case LogContradiction::Kind::dry_friction: return "dry_friction";
@@ -243,9 +244,9 @@ std::string effort_declaration(const Robot& robot) {
 
 void find_latency(LogSource& log, const Setting& s, const Fit& fit, const std::optional<EffortTiming>& timing,
                   std::vector<LogContradiction>& out) {
-  if (s.robot.effort_delay_found) {
+  if (s.robot.effort_time_origin == model::EffortTimeOrigin::found) {
     const Interval taken = s.robot.effort_delay, smoothed = s.robot.effort_smoothing;
-    const bool late = taken != Interval{};
+    const bool late = taken != Interval{}, open = late && smoothed == Interval{} && taken.contains(0.0);
     out.push_back(
         {.kind = Kind::effort_timing,
          .withdraws = false,
@@ -253,15 +254,23 @@ void find_latency(LogSource& log, const Setting& s, const Fit& fit, const std::o
          .subject = s.measurement.effort_columns.front(),
          .value = late ? taken.upper : smoothed.upper,
          .limit = 0.0,
-         .sentence = fmt::format(
-             "the efforts come after the motion, which nobody declares:{}{}",
-             !late ? "" : fmt::format(" a delay of {:g} to {:g} ms is taken in", 1e3 * taken.lower, 1e3 * taken.upper),
-             smoothed == Interval{} ? ""
+         .sentence =
+             open ? fmt::format("when the efforts act nobody declares, and the log leaves a delay of {:g} to "
+                                "{:g} ms open: it is taken in",
+                                1e3 * taken.lower, 1e3 * taken.upper)
+                  : fmt::format("the efforts come after the motion, which nobody declares:{}{}",
+                                !late ? ""
+                                      : fmt::format(" a delay of {:g} to {:g} ms is taken in", 1e3 * taken.lower,
+                                                    1e3 * taken.upper),
+                                smoothed == Interval{}
+                                    ? ""
                                     : fmt::format("{} a low-pass filter of {:g} to {:g} ms is undone",
                                                   late ? ", and" : "", 1e3 * smoothed.lower, 1e3 * smoothed.upper)),
          .next = fmt::format("where that is known, {} in the robot file declares it; {} for narrower bounds",
                              effort_declaration(s.robot),
-                             late ? "stamp efforts and motion by one clock" : "log efforts that are not smoothed")});
+                             open   ? "`effort: {delay: [0, 0]}`, where efforts and motion have one clock,"
+                             : late ? "stamp efforts and motion by one clock"
+                                    : "log efforts that are not smoothed")});
   }
   const double step = s.survey.median_step;
   if (!timing || !(is_latency(*timing, step) || (s.noise_complete && may_be_latency(*timing, step)))) {
@@ -346,6 +355,48 @@ void find_dry_friction(LogSource& log, const Setting& s, const Fit& fitted, std:
        .next = "give the model `coulomb` (`parameters:` in the robot file)"});
 }
 
+// A shift that the log does not exclude, and with which a parameter would be outside its interval.
+void find_open_timing(const Commissioning& result, const Setting& s, const EffortTiming& timing,
+                      std::vector<LogContradiction>& out) {
+  if (s.robot.effort_time_origin == model::EffortTimeOrigin::declared) {
+    return;
+  }
+  LogContradiction found{.kind = Kind::timing_open, .withdraws = false, .demotes = true};
+  double most = 0.0;
+  for (std::size_t end = 0; end < 2; ++end) {
+    for (Eigen::Index j = 0; j < timing.open_change[end].size(); ++j) {
+      const ParameterResult& p = result.parameters[static_cast<std::size_t>(j)];
+      if (!p.estimate || p.excitation != identify::Excitation::identified || !(p.upper > p.lower)) {
+        continue;
+      }
+      const double from = std::clamp(*p.estimate, p.lower, p.upper), to = from + timing.open_change[end][j];
+      const double beyond = std::max(p.lower - to, to - p.upper) / (p.upper - p.lower);
+      if (beyond <= most) {
+        continue;
+      }
+      most = beyond;
+      const InWords w = in_words(s, static_cast<std::size_t>(j));
+      const double shift = end == 0 ? timing.open.lower : timing.open.upper;
+      found.subject = p.parameter.physical;
+      found.value = shift;
+      found.limit = end == 0 ? timing.allowed.lower : timing.allowed.upper;
+      found.sentence = fmt::format(
+          "the log does not exclude that the efforts come {:.2g} ms {} the motion: {} would be {:.4g} {} then, outside "
+          "[{:.4g}, {:.4g}]",
+          1e3 * std::abs(shift), shift > 0.0 ? "after" : "before", w.name, w.value(to), w.unit, w.value(p.lower),
+          w.value(p.upper));
+    }
+  }
+  if (most > 0.0) {
+    found.next = fmt::format(
+        "where the time of the efforts is known, declare it (`effort: {{delay: [0, 0]}}` in the robot file, or the "
+        "range "
+        "that it lies in: the log leaves [{:.2g}, {:.2g}] s open); a drive with faster changes shows it",
+        timing.open.lower, timing.open.upper);
+    out.push_back(std::move(found));
+  }
+}
+
 }  // namespace
 
 LogContradiction shift_finding(LogSource& log, const Setting& s, const Fit& fit, const EffortTiming& timing) {
@@ -396,8 +447,12 @@ SignalFindings contradictions_in_log(LogSource& log, const Setting& s, const Fit
   return findings;
 }
 
-std::vector<LogContradiction> contradictions_in_result(const Commissioning& result, const Setting& s, double raised) {
+std::vector<LogContradiction> contradictions_in_result(const Commissioning& result, const Setting& s,
+                                                       const std::optional<EffortTiming>& timing, double raised) {
   std::vector<LogContradiction> found;
+  if (timing) {
+    find_open_timing(result, s, *timing, found);
+  }
   const double t = core::student_quantile(0.95, std::max(result.residuals.freedom, 1.0));
   for (std::size_t j = 0; j < result.parameters.size(); ++j) {
     const ParameterResult& p = result.parameters[j];

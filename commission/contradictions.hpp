@@ -4,10 +4,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "bounds/box.hpp"
 #include "commission/contradiction.hpp"
@@ -33,6 +36,10 @@ struct EffortTiming {
   double score = 0.0;  ///< of a shift at the nearest one that is allowed, as a multiple of what is told from none at a
                        ///< risk of 1e-8: its sign is that of the shift, whatever interpolation makes of noise
   double moved = 0.0;  ///< largest change of a parameter from the one to the other, in its standard errors
+  Interval open{};     ///< s, the shifts that the log does not exclude at a risk of kRiskOfDoubt
+  /// By how much the estimate (p) changes from the nearest shift that is allowed to either end of `open`; empty for an
+  /// end that is allowed.
+  std::array<Eigen::VectorXd, 2> open_change{};
 
   /// s, how far the shift lies outside of what is allowed; 0 inside.
   [[nodiscard]] double beyond() const { return std::max({0.0, allowed.lower - delay, delay - allowed.upper}); }
@@ -78,10 +85,13 @@ struct SignalFindings {
 /// premises that fail. Walks `log` a few times.
 [[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
 
-/// Contradictions within a finished commissioning: estimates outside their set, held-out rows outside the thresholds, a
-/// noise bound that had to be raised by `raised` for the prior box to explain the log.
+/// Contradictions within a finished commissioning: estimates outside their set, shifts of `timing` that the log does not
+/// exclude and with which they would be, held-out rows outside the thresholds, a noise bound that had to be raised by
+/// `raised` for the prior box to explain the log.
 [[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result,
-                                                                     const Setting& setting, double raised);
+                                                                     const Setting& setting,
+                                                                     const std::optional<EffortTiming>& timing,
+                                                                     double raised);
 
 /// What a shift is beside declared errors.
 enum class ShiftWeight {

@@ -132,6 +132,16 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     }
     EffortTiming timing{.delay = found.shape[0], .standard_error = found.standard_error[0], .freedom = found.freedom};
     timing.allowed = allowed_shift(s.measurement, s.survey.median_step);
+    const double chance = errors_at(kRiskOfDoubt, timing.freedom) * timing.standard_error;
+    timing.open = {std::max(timing.delay - chance, -reach), std::min(timing.delay + chance, reach)};
+    for (std::size_t end = 0; end < 2; ++end) {
+      const double shift = end == 0 ? timing.open.lower : timing.open.upper;
+      const double nearest = std::clamp(shift, timing.allowed.lower, timing.allowed.upper);
+      const auto taken = at_shift(model, nearest, fit.weights), shifted = at_shift(model, shift, fit.weights);
+      if (shift != nearest && taken && shifted) {
+        timing.open_change[end] = shifted->theta - taken->theta;
+      }
+    }
     if (timing.beyond() == 0.0) {
       return timing;
     }

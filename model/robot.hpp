@@ -31,6 +31,13 @@ enum class Hold {
   first_order,  ///< measured, linear between samples
 };
 
+/// Where the delay and the smoothing of the efforts come from.
+enum class EffortTimeOrigin {
+  untold,    ///< the default: neither late nor early, which nobody declares
+  declared,  ///< the robot file
+  found,     ///< what a log shows, or leaves open
+};
+
 /// Time at which a held effort (Hold::zero_order) is replaced by the next one.
 enum class EffortChanges {
   between,     ///< at an unknown moment between the stamps of the two
@@ -141,12 +148,12 @@ struct Robot {
   EffortKind effort = EffortKind::torque;
   Hold hold = Hold::first_order;
   EffortChanges effort_changes = EffortChanges::between;  ///< of a held effort
-  Interval effort_delay{0.0, 0.0};        ///< s, holds the constant time by which logged efforts are late (< 0: early)
-  Interval effort_smoothing{0.0, 0.0};    ///< s, holds T of y += (1 − e^{−h/T})(u − y), as efforts are logged
-  bool effort_delay_found = false;        ///< effort_delay and effort_smoothing are what a log shows, undeclared
-  bool effort_unsigned = false;           ///< only |effort| was logged
-  std::map<std::string, double> nominal;  ///< physical parameter -> value as designed
-  std::map<std::string, Interval> prior;  ///< physical parameter -> bounds known beforehand
+  Interval effort_delay{0.0, 0.0};      ///< s, holds the constant time by which logged efforts are late (< 0: early)
+  Interval effort_smoothing{0.0, 0.0};  ///< s, holds T of y += (1 − e^{−h/T})(u − y), as efforts are logged
+  EffortTimeOrigin effort_time_origin = EffortTimeOrigin::untold;  ///< of effort_delay and effort_smoothing
+  bool effort_unsigned = false;                                    ///< only |effort| was logged
+  std::map<std::string, double> nominal;                           ///< physical parameter -> value as designed
+  std::map<std::string, Interval> prior;                           ///< physical parameter -> bounds known beforehand
   std::optional<std::vector<std::string>> parameters;  ///< requested parameters; nothing means the model's choice
   SensorNoise noise;
   FilterWish filter;

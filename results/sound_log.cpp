@@ -98,11 +98,11 @@ SoundLog open_sound_log(const std::vector<std::filesystem::path>& paths, const R
     out.log = std::move(reopened);
   }
   for (const doctor::LogFinding& finding : health.findings) {
-    const bool late = finding.id == "time.effort_delay" && finding.taken;
+    const bool late = finding.taken && (finding.id == "time.effort_delay" || finding.id == "signals.speed_filter");
     if (pose == WheelPose::judged && (late || finding.effort_smoothing)) {
       out.robot.effort_delay = late ? *finding.taken : out.robot.effort_delay;
       out.robot.effort_smoothing = finding.effort_smoothing.value_or(out.robot.effort_smoothing);
-      out.robot.effort_delay_found = true;
+      out.robot.effort_time_origin = model::EffortTimeOrigin::found;
       out.remarks.push_back(finding.sentence);
     }
   }

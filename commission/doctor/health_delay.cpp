@@ -20,9 +20,9 @@ using commission::EffortTiming;
 using commission::Fit;
 using commission::Setting;
 
-constexpr double kLongestTaken = 0.03;      // s: efforts later than this and than kMostStepsTaken are refused
-constexpr double kLongestSmoothing = 0.06;  // s, likewise
-constexpr double kMostStepsTaken = 2.5;     // two, and the half to which interpolated rows tell a shift
+constexpr double kLongestTaken = 0.1;       // s: efforts later than this and than kMostStepsTaken are refused
+constexpr double kLongestSmoothing = 0.1;   // s, likewise
+constexpr double kMostStepsTaken = 4.5;     // four, and the half to which interpolated rows tell a shift
 constexpr double kTakenFrom = 0.5;          // of the least shift that is a latency
 constexpr double kLateFrom = 0.15;          // steps: healthy logs showed 0.09 at most
 constexpr double kFilterRisk = 1e-4;        // of an interval of κ that misses

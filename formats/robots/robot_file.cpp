@@ -198,6 +198,7 @@ struct RobotReader {
           robot.effort_changes = static_cast<model::EffortChanges>(value.choice({"between", "at_samples"}));
         } else if (name == "delay") {
           robot.effort_delay = delay(value);
+          robot.effort_time_origin = model::EffortTimeOrigin::declared;
         } else if (name == "smoothing") {
           robot.effort_smoothing = delay(value, 0.0);
         } else {
@@ -530,8 +531,10 @@ Json to_json(const Robot& robot) {
   out["effort"] = {{"kind", efforts[static_cast<std::size_t>(robot.effort)]},
                    {"hold", holds[static_cast<std::size_t>(robot.hold)]},
                    {"unsigned", robot.effort_unsigned},
-                   {"changes", changes[static_cast<std::size_t>(robot.effort_changes)]},
-                   {"delay", Json::array({robot.effort_delay.lower, robot.effort_delay.upper})}};
+                   {"changes", changes[static_cast<std::size_t>(robot.effort_changes)]}};
+  if (robot.effort_time_origin != model::EffortTimeOrigin::untold || robot.effort_delay != Interval{}) {
+    out["effort"]["delay"] = Json::array({robot.effort_delay.lower, robot.effort_delay.upper});
+  }
   if (robot.effort_smoothing != Interval{}) {
     out["effort"]["smoothing"] = Json::array({robot.effort_smoothing.lower, robot.effort_smoothing.upper});
   }

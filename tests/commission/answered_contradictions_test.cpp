@@ -374,7 +374,7 @@ TEST(AnsweredContradiction, ABestGuessFarOutsideADeclaredSetWithdrawsTheModel) {
     mass.estimate = mass.upper + widths * width;
     mass.standard_error = error * width;
     mass.estimate_inside = false;
-    const auto found = contradictions_in_result(result, setting, 1.0);
+    const auto found = contradictions_in_result(result, setting, std::nullopt, 1.0);
     return found.empty() ? -1 : static_cast<int>(found.front().withdraws);
   };
   EXPECT_EQ(outside_by(2.0, 0.01), 1);
@@ -392,12 +392,12 @@ TEST(AnsweredContradiction, HeldOutRowsOutsideTheThresholdsAreTold) {
   const Setting setting = settle(log, s.robot);
   result.validation[0].instants = 1000;
   result.validation[0].outside = 50;
-  const auto many = contradictions_in_result(result, setting, 1.0);
+  const auto many = contradictions_in_result(result, setting, std::nullopt, 1.0);
   ASSERT_EQ(many.size(), 1U);
   EXPECT_EQ(many[0].kind, Kind::held_out_outside);
   EXPECT_TRUE(many[0].withdraws);
   result.validation[0].outside = 1;
-  EXPECT_FALSE(contradictions_in_result(result, setting, 1.0).at(0).withdraws);
+  EXPECT_FALSE(contradictions_in_result(result, setting, std::nullopt, 1.0).at(0).withdraws);
 }
 
 // Some seconds of a block that is held out are noisier than all others: what is learnt of the others is raised, and

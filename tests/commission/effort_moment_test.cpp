@@ -83,13 +83,14 @@ LogTable drive(const World& w, std::uint64_t seed) {
   return log;
 }
 
-Commissioning commissioned(const World& w, std::uint64_t seed, bool declared) {
+Commissioning commissioned(const World& w, std::uint64_t seed, bool declared, bool in_time = false) {
   Robot robot;
   robot.wheel_radius = kRadius;
   robot.track_width = kTrack;
   robot.hold = Hold::zero_order;
   robot.effort_changes = model::EffortChanges::between;
   robot.parameters = {"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};
+  robot.effort_time_origin = in_time ? model::EffortTimeOrigin::declared : model::EffortTimeOrigin::untold;
   if (declared) {
     robot.noise.wheel_speed.value = w.speed_noise;
     robot.noise.effort.value = w.effort_noise;
@@ -168,6 +169,41 @@ TEST(EffortMoment, BeyondTheStepTakesTheGuaranteeAsSoonAsTheLogShowsIt) {
   }
   EXPECT_GT(refused, 0U);
   EXPECT_GT(doubted, 0U);
+}
+
+// Noise that averages out leaves thin sets, and slow driving tells little of a shift.
+TEST(EffortMoment, ShiftsThatTheLogLeavesOpenAreInTheBoundsUnlessTheRobotFileSaysThatEffortsAreInTime) {
+  std::size_t taken_in = 0, guaranteed = 0;
+  for (const double noise : {0.01, 0.03, 0.1, 0.3}) {
+    for (const int late : {0, 1, 2}) {
+      for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+        World w = kSlow;
+        w.moment = 0.5;
+        w.late = late;
+        w.speed_noise = noise;
+        w.effort_noise = 0.2 * noise;
+        const Commissioning c = commissioned(w, seed, true);
+        const std::string what = described(w, seed, c);
+        if (!c.has_model()) {
+          continue;
+        }
+        EXPECT_TRUE(holds_the_truth(w, c)) << what;
+        const model::Robot& robot = c.model.robot;
+        if (robot.effort_time_origin == model::EffortTimeOrigin::found) {
+          ++taken_in;
+          EXPECT_EQ(c.model.warrant, core::Warrant::extrapolated) << what;
+          EXPECT_TRUE(robot.effort_delay.contains(w.late * w.step)) << robot.effort_delay.upper << what;
+        }
+        if (late == 0) {
+          const Commissioning in_time = commissioned(w, seed, true, true);
+          EXPECT_EQ(in_time.model.robot.effort_delay, Interval{}) << what;
+          guaranteed += in_time.model.warrant == core::Warrant::guaranteed && holds_the_truth(w, in_time) ? 1 : 0;
+        }
+      }
+    }
+  }
+  EXPECT_GT(taken_in, 0U);
+  EXPECT_EQ(guaranteed, 32U);
 }
 
 // A shift of 0.6 steps of 10 ms beyond what is allowed, known to `errors` standard errors.

@@ -178,11 +178,11 @@ commission::Commissioning commissioned(const LogTable& log, Robot read, const Lo
     read.speed_filter = found.speed_filter ? found.speed_filter : read.speed_filter;
     if (found.id == "time.effort_delay" && found.taken) {
       read.effort_delay = *found.taken;
-      read.effort_delay_found = true;
+      read.effort_time_origin = model::EffortTimeOrigin::found;
     }
     if (found.effort_smoothing) {
       read.effort_smoothing = *found.effort_smoothing;
-      read.effort_delay_found = true;
+      read.effort_time_origin = model::EffortTimeOrigin::found;
     }
   }
   TableSource source(log);

@@ -326,6 +326,10 @@ Scene play(const Case& c, bool exact) {
   if (c.broken == Broken::unlogged_commands) {
     r.effort_changes = model::EffortChanges::between;
   }
+  // Whose efforts are in time says so; who does not know that they are late says nothing.
+  if (c.broken == Broken::none) {
+    r.effort_time_origin = model::EffortTimeOrigin::declared;
+  }
   if (c.delay_declared) {
     r.effort_delay = {0.0, c.delay * (1.0 + 1e-9)};
   }
