@@ -708,6 +708,11 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
         !holds(result.contradictions, LogContradiction::Kind::effort_timing)) {
       result.contradictions.push_back(shift_finding(log, s, fit, *timing));
     }
+    if (s.noise_complete && halves_are_explained(log, robot)) {
+      result.contradictions.push_back({.kind = LogContradiction::Kind::halves_disagree,
+                                       .sentence = std::string(kOnlyInHalves),
+                                       .next = std::string(kWhatChanged)});
+    }
     result.minimax = needed_noise(log, s, result, options.outliers);
     result.status = Commissioning::Status::empty;
     result.message = status_message(s, result);

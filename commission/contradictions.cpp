@@ -2,6 +2,7 @@
 #include "commission/contradictions.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -355,6 +356,11 @@ void find_dry_friction(LogSource& log, const Setting& s, const Fit& fitted, std:
        .next = "give the model `coulomb` (`parameters:` in the robot file)"});
 }
 
+// Standard errors by which the estimate of any parameter leaves a set that holds the truth, at a risk of kRiskOfDoubt.
+double doubtful(const Commissioning& result) {
+  return errors_at(kRiskOfDoubt / static_cast<double>(result.parameters.size()), result.residuals.freedom);
+}
+
 // A shift that the log does not exclude, and with which a parameter would be outside its interval.
 void find_open_timing(const Commissioning& result, const Setting& s, const EffortTiming& timing,
                       std::vector<LogContradiction>& out) {
@@ -370,7 +376,8 @@ void find_open_timing(const Commissioning& result, const Setting& s, const Effor
         continue;
       }
       const double from = std::clamp(*p.estimate, p.lower, p.upper), to = from + timing.open_change[end][j];
-      const double beyond = std::max(p.lower - to, to - p.upper) / (p.upper - p.lower);
+      const double below = p.lower_is_prior ? 0.0 : p.lower - to, above = p.upper_is_prior ? 0.0 : to - p.upper;
+      const double beyond = std::max(below, above) / (p.upper - p.lower);
       if (beyond <= most) {
         continue;
       }
@@ -482,6 +489,7 @@ std::vector<LogContradiction> contradictions_in_result(const Commissioning& resu
     found.push_back(
         {.kind = Kind::estimate_outside,
          .withdraws = far && s.noise_complete,
+         .demotes = s.noise_complete && gap > doubtful(result) * *p.standard_error,
          .subject = p.parameter.physical,
          .value = *p.estimate,
          .limit = *p.estimate < p.lower ? p.lower : p.upper,
@@ -536,7 +544,8 @@ std::optional<Reach> reach_of(const LogContradiction& c, const Commissioning& re
 bool is_shift(const LogContradiction& c) { return c.kind == Kind::effort_timing && c.limit > 0.0; }
 
 bool is_weighed(const LogContradiction& c) {
-  return is_shift(c) || (c.withdraws && (c.kind == Kind::wrong_sign || c.kind == Kind::estimate_outside));
+  return is_shift(c) || (c.withdraws && c.kind == Kind::wrong_sign) ||
+         ((c.withdraws || c.demotes) && c.kind == Kind::estimate_outside);
 }
 
 }  // namespace
@@ -558,10 +567,10 @@ void weigh_contradictions(Commissioning& result, const Setting& s, const Fit& fi
       c.demotes = weight == ShiftWeight::doubted;
     } else if (const auto reach = reach_of(c, result, fit)) {
       const auto at = static_cast<Eigen::Index>(reach->parameter);
-      const double chance = certain(result.residuals.freedom) * *result.parameters[reach->parameter].standard_error;
-      const double doubt = chance + explained.in_doubt[at];
-      c.withdraws = reach->size > doubt + explained.noise[at];
-      c.demotes = !c.withdraws && reach->size > doubt && errors_average;
+      const double error = *result.parameters[reach->parameter].standard_error, doubt = explained.in_doubt[at];
+      c.withdraws =
+          c.withdraws && reach->size > certain(result.residuals.freedom) * error + doubt + explained.noise[at];
+      c.demotes = !c.withdraws && errors_average && reach->size > doubtful(result) * error + doubt;
     }
   }
   std::erase_if(result.contradictions,
@@ -582,6 +591,24 @@ ShiftWeight weigh_shift(const EffortTiming& timing, const Explained& explained, 
   const double by = beyond(errors_at(kRiskOfDoubt, timing.freedom));
   const bool doubted = by > explained.shift_by_chance || (by > 0.0 && timing.residual_ratio < kMuchExplained);
   return may_be_latency(timing, step) && doubted ? ShiftWeight::doubted : ShiftWeight::explained;
+}
+
+bool halves_are_explained(LogSource& log, const Robot& robot) {
+  constexpr double kUnusedRisk = 1e-3;
+  log.rewind();
+  const LogTable table = core::read_all(log);
+  log.rewind();
+  const std::size_t middle = table.rows() / 2;
+  return std::ranges::all_of(std::array{std::size_t{0}, middle}, [&](std::size_t first) {
+    const LogTable rows = core::slice(table, first, first + middle);
+    TableSource half(rows);
+    try {
+      const Setting s = settle(half, robot);
+      return within_declared(half, s, fit_log(half, s, Part::everything, kUnusedRisk), std::nullopt).a_set;
+    } catch (const Error&) {
+      return false;  // too short, or without motion
+    }
+  });
 }
 
 WithinDeclared within_declared(LogSource& log, const Setting& s, const Fit& fit,

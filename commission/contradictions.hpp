@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -17,6 +18,7 @@
 #include "core/interval.hpp"
 #include "core/log.hpp"
 #include "model/filter/noise.hpp"
+#include "model/robot.hpp"
 
 namespace wheelwright::commission {
 
@@ -84,6 +86,17 @@ struct SignalFindings {
 /// Wrapped angles, constant and unrelated efforts; where there are none, timing, wrong signs, wheels that disagree, and
 /// premises that fail. Walks `log` a few times.
 [[nodiscard]] SignalFindings contradictions_in_log(LogSource& log, const Setting& setting, const Fit& fit);
+
+/// Of a log that no parameters explain within its declared noise: whether each of its halves has some that do.
+[[nodiscard]] bool halves_are_explained(LogSource& log, const model::Robot& robot);
+
+/// What is said then, and what to do about it.
+inline constexpr std::string_view kOnlyInHalves =
+    "each of its halves has parameters that explain it: mass, friction or an offset of the efforts may have changed in "
+    "between";
+inline constexpr std::string_view kWhatChanged =
+    "drive with one load and warm, or commission the parts apart and `wheelwright compare` their models; or the bounds "
+    "under `noise:` are a little too small";
 
 /// Contradictions within a finished commissioning: estimates outside their set, shifts of `timing` that the log does not
 /// exclude and with which they would be, held-out rows outside the thresholds, a noise bound that had to be raised by

@@ -2,7 +2,10 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -12,6 +15,7 @@
 #include "commission/effort_smoothing.hpp"
 #include "commission/fit.hpp"
 #include "commission/setting.hpp"
+#include "core/words.hpp"
 
 namespace wheelwright::doctor {
 namespace {
@@ -20,16 +24,16 @@ using commission::EffortTiming;
 using commission::Fit;
 using commission::Setting;
 
-constexpr double kLongestTaken = 0.1;       // s: efforts later than this and than kMostStepsTaken are refused
-constexpr double kLongestSmoothing = 0.1;   // s, likewise
-constexpr double kMostStepsTaken = 4.5;     // four, and the half to which interpolated rows tell a shift
-constexpr double kTakenFrom = 0.5;          // of the least shift that is a latency
-constexpr double kLateFrom = 0.15;          // steps: healthy logs showed 0.09 at most
-constexpr double kFilterRisk = 1e-4;        // of an interval of κ that misses
-constexpr double kNoisyEffort = 0.1;        // of κ: noise of the efforts makes it look smaller
-constexpr double kLeastSharpening = 0.03;   // κ, steps
-constexpr double kMostSharpening = 0.7;     // more may be a step of delay
-constexpr double kMovedBySmoothing = 2.0;   // standard errors of a parameter
+constexpr double kLongestTaken = 0.1;      // s: efforts later than this and than kMostStepsTaken are refused
+constexpr double kLongestSmoothing = 0.1;  // s, likewise
+constexpr double kMostStepsTaken = 4.5;    // four, and the half to which interpolated rows tell a shift
+constexpr double kTakenFrom = 0.5;         // of the least shift that is a latency
+constexpr double kLateFrom = 0.15;         // steps: healthy logs showed 0.09 at most
+constexpr double kFilterRisk = 1e-4;       // of an interval of κ that misses
+constexpr double kNoisyEffort = 0.1;       // of κ: noise of the efforts makes it look smaller
+constexpr double kLeastSharpening = 0.03;  // κ, steps
+constexpr double kMostSharpening = 0.7;    // more may be a step of delay
+constexpr double kMovedBySmoothing = 2.0;  // standard errors of a parameter
 
 // What was found of efforts and motion in time, and what declared errors make of it.
 struct Timing {
@@ -64,15 +68,19 @@ Timing timing_of(const HealthView& view, LogSource& log, const Setting& s, const
   return timing;
 }
 
-void tell_unexplained(const char* even_so, std::vector<LogFinding>& out) {
-  out.push_back({.id = "motion.refused",
-                 .topic = FindingTopic::motion,
-                 .severity = FindingSeverity::fatal,
-                 .sentence = fmt::format(
-                     "Commissioning refuses the log: {}no parameters explain it within its declared noise.", even_so),
-                 .next = "Look for a fault, for an effect that the model lacks (`gap`), and whether the bounds under "
-                         "`noise:` are too small; `wheelwright commission` says by how much they would have to be "
-                         "larger."});
+void tell_unexplained(const HealthView& view, LogSource& log, std::string_view even_so, std::vector<LogFinding>& out) {
+  const bool halves = view.robot_given && commission::halves_are_explained(log, view.robot);
+  out.push_back(
+      {.id = "motion.refused",
+       .topic = FindingTopic::motion,
+       .severity = FindingSeverity::fatal,
+       .sentence =
+           fmt::format("Commissioning refuses the log: {}no parameters explain it within its declared noise{}{}.",
+                       even_so, halves ? "; " : "", halves ? commission::kOnlyInHalves : ""),
+       .next = halves ? core::capital(std::string(commission::kWhatChanged)) + "."
+                      : "Look for a fault, for an effect that the model lacks (`gap`), and whether the bounds "
+                        "under `noise:` are too small; `wheelwright commission` says by how much they would "
+                        "have to be larger."});
 }
 
 // κ of a filter of the efforts at a risk of kFilterRisk.
@@ -127,7 +135,7 @@ bool check_effort_filter(const HealthView& view, LogSource& log, const Setting& 
   Robot robot = view.robot;
   robot.effort_smoothing = range;
   if (s.noise_complete && !read_as(log, robot).explained) {
-    tell_unexplained("even with its efforts so read, ", out);
+    tell_unexplained(view, log, "even with its efforts so read, ", out);
   }
   return true;
 }
@@ -256,7 +264,7 @@ void check_delay(const HealthView& view, LogSource& log, const Setting& s, const
   }
   if (!shift) {
     if (timing.refuses()) {
-      tell_unexplained("", out);
+      tell_unexplained(view, log, "", out);
     }
     return;
   }
@@ -293,7 +301,7 @@ void check_delay(const HealthView& view, LogSource& log, const Setting& s, const
   }
   out.push_back(f);
   if (!timing.declared.a_set && !taken && !refused) {
-    tell_unexplained(tried ? "even with its efforts so late, " : "", out);
+    tell_unexplained(view, log, tried ? "even with its efforts so late, " : "", out);
   }
 }
 

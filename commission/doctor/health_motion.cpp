@@ -533,20 +533,29 @@ void check_density(const HealthView& view, const commission::Setting& s, const c
 }
 
 void check_sides(const commission::Setting& s, const commission::Fit& fit, std::vector<LogFinding>& out) {
+  const auto of_yaw = [&](std::size_t j) {
+    return s.model.parameters[j].physical == "yaw_inertia" || s.model.parameters[j].physical == "viscous_yaw";
+  };
+  bool others = true;  // are negative too
+  for (std::size_t j = 0; j < s.model.p(); ++j) {
+    others = others && (!of_yaw(j) || fit.estimate[static_cast<Eigen::Index>(j)] < 0.0);
+  }
   for (std::size_t j = 0; j < s.model.p(); ++j) {
     const auto at = static_cast<Eigen::Index>(j);
-    if (s.model.parameters[j].physical == "yaw_inertia" &&
-        fit.excitation[j].state == identify::Excitation::identified &&
+    const bool inertia = s.model.parameters[j].physical == "yaw_inertia";
+    if (of_yaw(j) && (inertia || others) && fit.excitation[j].state == identify::Excitation::identified &&
         fit.estimate[at] < -5.0 * fit.residuals.standard_error[at]) {
       out.push_back({.id = "units.effort_sides",
                      .topic = FindingTopic::units,
                      .severity = FindingSeverity::fatal,
-                     .sentence = "The efforts turn the robot the other way than it turns: the yaw inertia comes out "
-                                 "negative.",
+                     .sentence = fmt::format("The efforts turn the robot the other way than it turns: {} comes out "
+                                             "negative.",
+                                             inertia ? "the yaw inertia" : "the friction of turning"),
                      .next = "Right and left seem to be swapped, of the efforts or of the motion: check the columns.",
                      .columns = s.measurement.effort_columns,
                      .value = fit.estimate[at],
                      .unit = commission::parameter_unit(s.robot, s.model.parameters[j])});
+      return;
     }
   }
 }

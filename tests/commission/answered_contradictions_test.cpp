@@ -341,11 +341,11 @@ TEST(AnsweredContradiction, TwoEffortsOfDifferentUnitsDisagreeAboutTheMass) {
   EXPECT_NEAR(found->value, 2.5, 0.1);
 }
 
-TEST(AnsweredContradiction, HalvesOfDifferentMassDisagree) {
-  Scenario s = learnt_drive(11, 40.0);
+// A drive, and another one with `times` the mass behind it.
+LogTable loaded_halfway(Scenario s, double times) {
   LogTable table = simulate(s);
-  s.parameters.mass *= 1.2;
-  s.seed = 12;
+  s.parameters.mass *= times;
+  ++s.seed;
   const LogTable heavier = simulate(s);
   table.segment_starts = {0, table.rows()};
   for (std::size_t k = 0; k < heavier.rows(); ++k) {
@@ -354,10 +354,31 @@ TEST(AnsweredContradiction, HalvesOfDifferentMassDisagree) {
   for (std::size_t c = 0; c < table.columns.size(); ++c) {
     table.columns[c].insert(table.columns[c].end(), heavier.columns[c].begin(), heavier.columns[c].end());
   }
-  const Commissioning result = commissioned(table, s.robot);
+  return table;
+}
+
+TEST(AnsweredContradiction, HalvesOfDifferentMassDisagree) {
+  const Scenario s = learnt_drive(11, 40.0);
+  const Commissioning result = commissioned(loaded_halfway(s, 1.2), s.robot);
   const LogContradiction* found = find(result, Kind::halves_disagree);
   ASSERT_NE(found, nullptr) << result.message;
   EXPECT_EQ(found->subject, "mass");
+}
+
+TEST(AnsweredContradiction, WhatOnlyHalvesAreExplainedByIsSaidOfALogThatNoParametersExplain) {
+  const Scenario s = noisy_drive(11, 40.0);
+  const auto found = [&](const LogTable& table) {
+    const Commissioning result = commissioned(table, s.robot);
+    EXPECT_EQ(result.status, Status::empty) << result.message;
+    return find(result, Kind::halves_disagree) != nullptr &&
+           result.message.find("each of its halves") != std::string::npos;
+  };
+  EXPECT_TRUE(found(loaded_halfway(s, 1.3)));
+  LogTable offset = simulate(s);  // no half is explained where the efforts are another signal
+  for (std::size_t k = 0; k < offset.rows(); ++k) {
+    offset.column("tau_r")[k] += std::sin(2.0 * offset.t[k]);
+  }
+  EXPECT_FALSE(found(offset));
 }
 
 // Numbers as they were on real logs: the guess, its 95 % interval and the set lie apart.

@@ -125,6 +125,7 @@ Robot robot_of(const World& world, double bias = -1.0) {
   robot.wheel_radius = kRadius;
   robot.track_width = kTrack;
   robot.wheel_directions_checked = true;
+  robot.effort_time_origin = model::EffortTimeOrigin::declared;
   robot.hold = Hold::zero_order;
   robot.effort_changes = model::EffortChanges::at_samples;
   robot.parameters = std::vector<std::string>{"mass", "yaw_inertia", "viscous_linear", "viscous_yaw"};

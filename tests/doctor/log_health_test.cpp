@@ -230,13 +230,19 @@ TEST_F(LogHealthTest, AShortLogIsShort) {
 }
 
 TEST_F(LogHealthTest, LateEffortsAreTimed) {
-  constexpr std::size_t kLate = 5;
-  for (const char* name : {"tau_r", "tau_l"}) {
-    std::vector<double>& tau = log.column(name);
-    std::rotate(tau.begin(), tau.end() - kLate, tau.end());
-  }
-  const LogFinding found = expect("time.effort_delay", kFatal);
+  const auto late_by = [&](std::ptrdiff_t rows) {
+    for (const char* name : {"tau_r", "tau_l"}) {
+      std::vector<double>& tau = log.column(name);
+      std::rotate(tau.begin(), tau.end() - rows, tau.end());
+    }
+  };
+  late_by(5);
+  const LogFinding found = expect("time.effort_delay", kWarning);
   EXPECT_NEAR(found.value, 0.05, 0.005);
+  ASSERT_TRUE(found.taken);
+  EXPECT_TRUE(found.taken->contains(0.05));
+  late_by(10);
+  EXPECT_NEAR(expect("time.effort_delay", kFatal).value, 0.15, 0.015);
 }
 
 TEST_F(LogHealthTest, AWrappedWheelAngleIsFatal) {
@@ -607,6 +613,13 @@ TEST_F(LogHealthTest, EffortsInOtherUnitsSignsAndSides) {
   log = sound;
   std::swap(log.column("tau_r"), log.column("tau_l"));
   expect("units.effort_sides", kFatal);
+  log = sound;
+  Scenario light = scenario;  // its inertia is lost in the noise, the friction of turning is not
+  light.parameters.yaw_inertia = 0.05;
+  light.sensors.effort = 0.8;
+  log = with_gyro(sim::simulate(light), robot);
+  std::swap(log.column("tau_r"), log.column("tau_l"));
+  EXPECT_THAT(expect("units.effort_sides", kFatal).sentence, ::testing::HasSubstr("friction of turning"));
   log = sound;
   for (const char* name : {"tau_r", "tau_l"}) {
     std::ranges::transform(log.column(name), log.column(name).begin(), [](double v) { return std::abs(v); });
