@@ -24,6 +24,7 @@
 #include "commission/refined_set.hpp"
 #include "commission/setting.hpp"
 #include "commission/setting_rows.hpp"
+#include "commission/speed_unit.hpp"
 #include "commission/two_walks.hpp"
 #include "core/check.hpp"
 #include "core/limits.hpp"
@@ -761,6 +762,32 @@ Commissioning commissioned(LogSource& log, const Robot& robot, const CommissionO
   return result;
 }
 
+// Where the log does not tell whether its speeds were rounded or cut off, the intervals hold both.
+void hold_open_cut(LogSource& log, const Robot& robot, const CommissionOptions& options, Commissioning& result) {
+  if (!result.has_model() || result.model.measurement.motion != MotionKind::speed) {
+    return;
+  }
+  const auto cut = open_cut(log, robot, result.model.measurement.motion_columns);
+  if (!cut) {
+    return;
+  }
+  Robot as_cut = robot;
+  as_cut.speed_cut = cut;
+  const Commissioning other = commissioned(log, as_cut, options, {});
+  if (!other.has_model()) {
+    return;
+  }
+  for (std::size_t j = 0; j < result.parameters.size(); ++j) {
+    result.parameters[j].lower = std::min(result.parameters[j].lower, other.parameters[j].lower);
+    result.parameters[j].upper = std::max(result.parameters[j].upper, other.parameters[j].upper);
+  }
+  result.notes.push_back(
+      fmt::format("speeds are in whole multiples of {:.4g} rad/s, rounded or cut off, which `speed_cut` in the robot "
+                  "file says: the "
+                  "intervals of the parameters hold both",
+                  cut->unit));
+}
+
 }  // namespace
 
 KinematicCommissionOptions kinematic_options(const Robot& robot, const CommissionOptions& options) {
@@ -790,6 +817,7 @@ Commissioning commission_robot(LogSource& log, const Robot& robot, const Commiss
       result = std::move(raised);
     }
   }
+  hold_open_cut(log, doubted.value_or(robot), options, result);
   settle_warrants(result);
   if (options.at_risk != CommissionOptions::AtRisk::nothing) {
     const AtRiskOptions at_risk{.reach = options.at_risk == CommissionOptions::AtRisk::reach,

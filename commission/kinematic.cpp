@@ -441,37 +441,6 @@ void validate_held_out(const Frame& s, KinematicCommissioning& result) {
       detector::ThresholdRule(*set.polytope, best_guess(fit->squares.estimate, fit->excitation, *set.polytope)));
 }
 
-// Where speeds are whole multiples of a unit, and nothing says whether they were rounded or cut off: the latter.
-std::optional<model::SpeedCut> open_cut(LogSource& log, const Robot& robot, const filter::OdometryMeasurement& m) {
-  constexpr std::size_t kRows = 60000;
-  constexpr double kTop = 0.99;  // quantile
-  if (m.motion != MotionKind::speed || m.cut || robot.noise.wheel_speed.value) {
-    return std::nullopt;
-  }
-  std::array<std::vector<double>, 2> speeds;
-  const std::array<std::optional<std::size_t>, 2> columns = {log.find(m.motion_columns[0]),
-                                                             log.find(m.motion_columns[1])};
-  log.rewind();
-  for (LogBlock block; speeds[0].size() < kRows && log.next(block);) {
-    for (std::size_t wheel = 0; wheel < 2; ++wheel) {
-      std::ranges::copy(block.columns[*columns[wheel]], std::back_inserter(speeds[wheel]));
-    }
-  }
-  log.rewind();
-  double unit = 0.0;
-  for (const std::vector<double>& of_wheel : speeds) {
-    std::vector<double> sizes(of_wheel.size());
-    std::ranges::transform(of_wheel, sizes.begin(), [](double speed) { return std::abs(speed); });
-    const auto rank = static_cast<std::size_t>(kTop * static_cast<double>(sizes.size()));
-    const double top = sizes.empty() ? 0.0 : core::order_statistic(std::move(sizes), rank);
-    const double found = top > 0.0 ? unit_of_speeds(of_wheel, top) : 0.0;
-    if (found > kCoarseUnit * top) {
-      unit = std::max(unit, found);
-    }
-  }
-  return unit > 0.0 ? std::optional(model::SpeedCut{.unit = unit}) : std::nullopt;
-}
-
 // `result` holds, beside its own, the intervals of `other`.
 void join_intervals(KinematicCommissioning& result, const KinematicCommissioning& other, double unit) {
   for (std::size_t j = 0; j < std::min(result.parameters.size(), other.parameters.size()); ++j) {
@@ -574,7 +543,8 @@ KinematicCommissioning commission_kinematics(LogSource& log, const Robot& robot,
   if (!result.model) {
     return result;
   }
-  if (const auto cut = open_cut(log, robot, *measurement)) {
+  if (const auto cut =
+          measurement->motion == MotionKind::speed ? open_cut(log, robot, measurement->motion_columns) : std::nullopt) {
     filter::OdometryMeasurement as_cut = *measurement;
     as_cut.cut = cut;
     join_intervals(result, commissioned_as(log, robot, as_cut, survey, options), cut->unit);

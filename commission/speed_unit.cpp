@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+
+#include "core/statistics.hpp"
 
 namespace wheelwright::commission {
 namespace {
 
 constexpr double kNearUnit = 0.1;           // of the unit: as far from its multiples are decimals that are printed
-constexpr double kSparse = 0.2;             // distinct values over rows, above which the column is not coarse
+constexpr double kSparse = 0.5;             // distinct values over rows, above which the column is not coarse
 constexpr std::size_t kLeastRounded = 200;  // rows
 
 }  // namespace
@@ -44,6 +47,31 @@ double unit_of_speeds(const std::vector<double>& speeds, double top) {
     unit = mn / nn;
   }
   return unit;
+}
+
+std::optional<model::SpeedCut> open_cut(LogSource& log, const model::Robot& robot,
+                                        const std::vector<std::string>& columns) {
+  constexpr std::size_t kRows = 60000;
+  constexpr double kTop = 0.99;  // quantile
+  if (robot.speed_cut || robot.noise.wheel_speed.value) {
+    return std::nullopt;
+  }
+  double unit = 0.0;
+  for (const std::string& name : columns) {
+    const std::size_t column = *log.find(name);
+    std::vector<double> speeds, sizes;
+    log.rewind();
+    for (LogBlock block; speeds.size() < kRows && log.next(block);) {
+      std::ranges::copy(block.columns[column], std::back_inserter(speeds));
+    }
+    std::ranges::transform(speeds, std::back_inserter(sizes), [](double speed) { return std::abs(speed); });
+    const auto rank = static_cast<std::size_t>(kTop * static_cast<double>(sizes.size()));
+    const double top = sizes.empty() ? 0.0 : core::order_statistic(std::move(sizes), rank);
+    const double found = top > 0.0 ? unit_of_speeds(speeds, top) : 0.0;
+    unit = found > kCoarseUnit * top ? std::max(unit, found) : unit;
+  }
+  log.rewind();
+  return unit > 0.0 ? std::optional(model::SpeedCut{.unit = unit}) : std::nullopt;
 }
 
 }  // namespace wheelwright::commission

@@ -647,6 +647,24 @@ void check_single_efforts(LogSource& log, const commission::Setting& s, std::vec
   }
 }
 
+// Even samples behind scattered stamps, of which no clock was found to read them by: commissioning refuses them.
+void check_stamps(LogSource& log, const commission::Setting& s, std::vector<LogFinding>& out) {
+  std::vector<commission::LogContradiction> raw;
+  commission::find_raw_contradictions(log, s, raw);
+  for (const commission::LogContradiction& c : raw) {
+    if (c.kind == commission::LogContradiction::Kind::stamps_scatter) {
+      out.push_back({.id = "time.stamps_scatter",
+                     .topic = FindingTopic::time,
+                     .severity = FindingSeverity::fatal,
+                     .sentence = core::capital(c.sentence) + ".",
+                     .next = core::capital(c.next) + ".",
+                     .columns = s.measurement.motion_columns,
+                     .value = 1.0 / c.value,
+                     .unit = "1"});
+    }
+  }
+}
+
 void check_remainder(const commission::Setting& s, const commission::Fit& fit, std::vector<LogFinding>& out) {
   for (std::size_t i = 0; i < s.model.n(); ++i) {
     const identify::OutputResidual& o = fit.residuals.outputs[i];
@@ -688,6 +706,7 @@ bool check_motion(const HealthView& view, std::vector<LogFinding>& findings) {
       check_remainder(s, fit, findings);
       check_delay(view, log, s, fit, findings);
       check_single_efforts(log, s, findings);
+      check_stamps(log, s, findings);
     }
     return excited;
   } catch (const Error& error) {
