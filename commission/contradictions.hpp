@@ -98,9 +98,9 @@ inline constexpr std::string_view kWhatChanged =
     "drive with one load and warm, or commission the parts apart and `wheelwright compare` their models; or the bounds "
     "under `noise:` are a little too small";
 
-/// Contradictions within a finished commissioning: estimates outside their set, shifts of `timing` that the log does not
-/// exclude and with which they would be, held-out rows outside the thresholds, a noise bound that had to be raised by
-/// `raised` for the prior box to explain the log.
+/// Contradictions within a finished commissioning: estimates outside their set, shifts of `timing` that the log does
+/// not exclude and with which they would be, held-out rows outside the thresholds, a noise bound that had to be raised
+/// by `raised` for the prior box to explain the log.
 [[nodiscard]] std::vector<LogContradiction> contradictions_in_result(const Commissioning& result,
                                                                      const Setting& setting,
                                                                      const std::optional<EffortTiming>& timing,

@@ -20,8 +20,8 @@ inline constexpr double kCoarseUnit = 0.002;
 /// `top`: a top speed, by a millionth of which values differ at least.
 [[nodiscard]] double unit_of_speeds(const std::vector<double>& speeds, double top);
 
-/// Where the speeds in `columns` of `log` are whole multiples of a unit that matters (kCoarseUnit), and neither the robot
-/// file nor what was found says whether they were rounded or cut off: the latter. Reads the first 60,000 rows.
+/// Where the speeds in `columns` of `log` are whole multiples of a unit that matters (kCoarseUnit), and neither the
+/// robot file nor what was found says whether they were rounded or cut off: the latter. Reads the first 60,000 rows.
 [[nodiscard]] std::optional<model::SpeedCut> open_cut(LogSource& log, const model::Robot& robot,
                                                       const std::vector<std::string>& columns);
 
