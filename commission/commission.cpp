@@ -783,8 +783,7 @@ void hold_open_cut(LogSource& log, const Robot& robot, const CommissionOptions& 
   }
   result.notes.push_back(
       fmt::format("speeds are in whole multiples of {:.4g} rad/s, rounded or cut off, which `speed_cut` in the robot "
-                  "file says: the "
-                  "intervals of the parameters hold both",
+                  "file says: the intervals of the parameters hold both",
                   cut->unit));
 }
 

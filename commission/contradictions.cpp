@@ -397,8 +397,7 @@ void find_open_timing(const Commissioning& result, const Setting& s, const Effor
   if (most > 0.0) {
     found.next = fmt::format(
         "where the time of the efforts is known, declare it (`effort: {{delay: [0, 0]}}` in the robot file, or the "
-        "range "
-        "that it lies in: the log leaves [{:.2g}, {:.2g}] s open); a drive with faster changes shows it",
+        "range that it lies in: the log leaves [{:.2g}, {:.2g}] s open); a drive with faster changes shows it",
         timing.open.lower, timing.open.upper);
     out.push_back(std::move(found));
   }
