@@ -26,6 +26,7 @@ using model::SpeedFilterKind;
 constexpr double kFilterRisk = 1e-4;    // of an interval that misses, and of a filter that is taken for a shift's
 constexpr double kLongestTime = 0.3;    // s
 constexpr double kLongestShift = 0.2;   // s
+constexpr double kMostSteps = 12.0;     // of slow logs; a mean over n of them is late by half as many
 constexpr double kBand = 0.1;           // s, of the low-pass filter on both sides; two steps at least
 constexpr double kBandSettle = 6.0;     // of it, after which the start of a segment is forgotten
 constexpr double kClockSlack = 0.2;     // of a step, between a gyro's clock and the efforts'
@@ -171,7 +172,8 @@ std::optional<Tried> attempt_filter(const BandRows& rows, LowPass candidate, con
   const CandidateRows model(rows, candidate);
   const bool shift = candidate == LowPass::shift;
   const double lower = candidate == LowPass::mean ? rows.step : shift ? 0.0 : 0.1 * rows.step;
-  const double upper = std::max(shift ? kLongestShift : kLongestTime, 4.0 * rows.step);
+  const double upper =
+      shift ? std::max(kLongestShift, kMostSteps / 2.0 * rows.step) : std::max(kLongestTime, kMostSteps * rows.step);
   identify::VariableProjectionOptions options;
   options.lower = Eigen::VectorXd::Constant(1, lower);
   options.upper = Eigen::VectorXd::Constant(1, upper);
