@@ -502,7 +502,7 @@ int run(const Arguments& given) {
     for (const std::string& sentence : took) {
       say("took: {}\n", sentence);
     }
-    say("wrote {} and {}\n", file.string(), (out / "report.html").string());
+    say("wrote {}{}\n", yaml.empty() ? std::string() : file.string() + " and ", (out / "report.html").string());
   }
   return page.model ? kDone : kNo;
 }
