@@ -180,8 +180,9 @@ int run(const Arguments& a) {
   commission::EventIsolationOptions isolation;
   isolation.isolation.threads = static_cast<std::size_t>(std::max(a.common.threads, 1));
   const std::vector<detector::Isolation> isolations = commission::isolate_events(log, model, detection, isolation);
-  const std::vector<detector::Incident> incidents =
+  std::vector<detector::Incident> incidents =
       commission::join_events(log, model, detection, isolations, kinematic, isolation);
+  commission::add_sizes(log, model, incidents, isolation.isolation.threads);
   const bool asked = !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
   const std::optional<commission::OtherParameters> other =
       asked ? commission::explained_by_other_parameters(log, model, detection, kinematic) : std::nullopt;

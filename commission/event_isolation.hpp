@@ -41,6 +41,9 @@ struct EventIsolationOptions {
                                                               const Detection& detection,
                                                               const EventIsolationOptions& options = {});
 
+/// A size in words, outward to three digits of the larger end: " by 3.1 to 5.2 %".
+[[nodiscard]] std::string size_words(const Interval& magnitude, const FaultType& fault);
+
 /// A finding that is consistent, for people: "the right wheel's radius changes by 3.1 to 5.2 %, since 12.40 to
 /// 12.62 s, if it was a step that stays". That condition is said of every fault whose size may grow.
 [[nodiscard]] std::string sentence(const detector::FaultFinding& finding);
@@ -48,5 +51,9 @@ struct EventIsolationOptions {
 /// All findings in a sentence: "consistent with: …; …. Excluded: …. Not examined: …", or that nothing in the catalogue
 /// explains the data.
 [[nodiscard]] std::string sentence(const detector::Isolation& isolation);
+
+/// For people, of a fault whose size is known to be something: "whatever its course by 8.1 to 9.9 % on average over the
+/// 1.00 s before 31.20 s; if it only grew by 8.4 to 12.1 % at 40.00 s"; empty where nothing is known of it.
+[[nodiscard]] std::string sentence(const detector::SizeOverTime& size);
 
 }  // namespace wheelwright::commission

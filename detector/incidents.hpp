@@ -42,6 +42,8 @@ struct Incident {
   /// those that change by the number of events that they explain, then by the width of the size's interval relative to
   /// its middle. The order is no proof.
   std::vector<IncidentCandidate> candidates;
+  /// Sizes over time of faults that may have caused it, steps or not; empty where they were not asked for.
+  std::vector<SizeOverTime> sizes{};
 };
 
 /// Options of IncidentRecorder.

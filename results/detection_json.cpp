@@ -73,6 +73,22 @@ Json finding_json(const detector::FaultFinding& f) {
   return entry;
 }
 
+Json size_json(const detector::SizeOverTime& size) {
+  Json means = Json::array(), growing = Json::array();
+  for (const detector::MeanSize& mean : size.means) {
+    means.push_back({{"from", mean.from}, {"to", mean.to}, {"lower", mean.size.lower}, {"upper", mean.size.upper}});
+  }
+  for (const detector::SizeAt& at : size.growing) {
+    growing.push_back({{"t", at.t}, {"lower", at.size.lower}, {"upper", at.size.upper}});
+  }
+  return {{"fault", size.fault.name},
+          {"unit", size.fault.unit},
+          {"means", std::move(means)},
+          {"growing", std::move(growing)},
+          {"growing_excluded", size.growing_excluded},
+          {"sentence", commission::sentence(size)}};
+}
+
 }  // namespace
 
 Json to_json(const detector::Incident& incident) {
@@ -85,15 +101,15 @@ Json to_json(const detector::Incident& incident) {
     entry["sentence"] = commission::sentence(candidate.finding);
     candidates.push_back(std::move(entry));
   }
-  return {{"start", incident.start},
-          {"alarm", incident.alarm},
-          {"end", incident.end},
-          {"events", incident.events},
-          {"examined", incident.examined},
-          {"unexplained", incident.unexplained},
-          {"stays", incident.stays},
-          {"candidates", std::move(candidates)},
-          {"sentence", words::incident_sentence(incident)}};
+  Json sizes = Json::array();
+  for (const detector::SizeOverTime& size : incident.sizes) {
+    sizes.push_back(size_json(size));
+  }
+  return {{"start", incident.start},       {"alarm", incident.alarm},
+          {"end", incident.end},           {"events", incident.events},
+          {"examined", incident.examined}, {"unexplained", incident.unexplained},
+          {"stays", incident.stays},       {"candidates", std::move(candidates)},
+          {"sizes", std::move(sizes)},     {"sentence", words::incident_sentence(incident)}};
 }
 
 void add_incidents(Json& detection, const std::vector<detector::Incident>& incidents) {

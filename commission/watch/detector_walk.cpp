@@ -236,18 +236,6 @@ void gather(LogSource& log, std::vector<Piece>& pieces) {
   log.rewind();
 }
 
-// " by 3.1 to 5.2 %": outward, to three digits of the larger end.
-std::string size_words(const Interval& magnitude, const model::FaultType& fault) {
-  const bool share = fault.unit == "1";
-  const double factor = share ? 100.0 : 1.0;
-  const double low = factor * magnitude.lower, high = factor * magnitude.upper;
-  const double size = std::max({std::abs(low), std::abs(high), 1e-12});
-  const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(size))), 0, 9);
-  const double unit = std::pow(10.0, -decimals);
-  return fmt::format(" by {:.{}f} to {:.{}f} {}", std::floor(low / unit) * unit, decimals,
-                     std::ceil(high / unit) * unit, decimals, share ? "%" : fault.unit);
-}
-
 std::string names(const detector::Isolation& isolation, Verdict verdict) {
   std::string out;
   for (const detector::FaultFinding& f : isolation.findings) {
@@ -259,6 +247,17 @@ std::string names(const detector::Isolation& isolation, Verdict verdict) {
 }
 
 }  // namespace
+
+std::string size_words(const Interval& magnitude, const model::FaultType& fault) {
+  const bool share = fault.unit == "1";
+  const double factor = share ? 100.0 : 1.0;
+  const double low = factor * magnitude.lower, high = factor * magnitude.upper;
+  const double size = std::max({std::abs(low), std::abs(high), 1e-12});
+  const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(size))), 0, 9);
+  const double unit = std::pow(10.0, -decimals);
+  return fmt::format(" by {:.{}f} to {:.{}f} {}", std::floor(low / unit) * unit, decimals,
+                     std::ceil(high / unit) * unit, decimals, share ? "%" : fault.unit);
+}
 
 double isolation_memory(const OnlineModel& model) {
   const double torque = (kMemory + model.filter.settle) / model.filter.beta;

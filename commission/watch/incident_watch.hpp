@@ -27,6 +27,13 @@ namespace wheelwright::commission {
                                                           const KinematicWatch& kinematic,
                                                           const EventIsolationOptions& options = {});
 
+/// Fills Incident::sizes of every incident that was isolated, from 3 s before it to 1 s behind its end, and up to
+/// 120 s after it began: what both residuals say of the size over time of each fault of the catalogue that
+/// has one, whether it was a step or not. Walks `log` once and holds these rows. Faults that no course of the size
+/// explains are left out, and so are those of which nothing is known.
+void add_sizes(LogSource& log, const OnlineModel& model, std::vector<detector::Incident>& incidents,
+               std::size_t threads = 1);
+
 /// The columns of rows that isolations of `model` look at: those of the torque residual, and with `kinematic` of the
 /// kinematic one.
 [[nodiscard]] std::vector<std::string> isolation_columns(const OnlineModel& model, bool kinematic);

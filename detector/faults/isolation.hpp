@@ -98,6 +98,27 @@ struct Isolation {
   [[nodiscard]] std::size_t count_at_risk() const;
 };
 
+/// Weighted mean of a fault's size over [from, to].
+struct MeanSize {
+  double from = 0.0, to = 0.0;  ///< s
+  Interval size{};              ///< holds the mean, in the fault's unit
+};
+
+/// Size of a fault at one instant.
+struct SizeAt {
+  double t = 0.0;   ///< s
+  Interval size{};  ///< holds it, in the fault's unit
+};
+
+/// Size of one fault over time, whether it is a step or not (size_over_time.hpp).
+struct SizeOverTime {
+  FaultType fault;
+  std::vector<MeanSize> means{};  ///< any bounded course; empty where no weights are known
+  bool excluded = false;          ///< no bounded course explains the rows
+  std::vector<SizeAt> growing{};  ///< if it only grows: at 200 instants at most; empty where nothing is known
+  bool growing_excluded = false;  ///< it did not only grow
+};
+
 /// Tells `faults` apart after an alarm at `alarm` whose first instant outside is `outside` (both times of rows of the
 /// log, s). `motion` is the log's own (read_reference() with `filter`), or a piece of it that begins 16/β and more
 /// before the window; `set` is P. Throws InvalidArgument where `alarm` is not in the motion, or options make no sense.

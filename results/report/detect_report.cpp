@@ -157,6 +157,48 @@ std::string at_risk_section(const commission::RiskWatch& watch, const OnlineMode
              : out + table({"alarm", "until", "matched to", numeric("over, s"), numeric("times the threshold")}, rows);
 }
 
+// Sizes over time, incident by incident: of the candidates first.
+std::string sizes_section(const std::vector<detector::Incident>& incidents) {
+  constexpr std::size_t most_incidents = 8, most_faults = 6;
+  std::string out;
+  for (std::size_t k = 0; k < std::min(incidents.size(), most_incidents); ++k) {
+    const detector::Incident& incident = incidents[k];
+    std::vector<const detector::SizeOverTime*> shown;
+    for (const detector::IncidentCandidate& candidate : incident.candidates) {
+      const auto at = std::ranges::find(incident.sizes, candidate.finding.fault.name,
+                                        [](const detector::SizeOverTime& s) { return s.fault.name; });
+      if (at != incident.sizes.end()) {
+        shown.push_back(&*at);
+      }
+    }
+    for (const detector::SizeOverTime& size : incident.sizes) {
+      if (!size.growing_excluded && std::ranges::find(shown, &size) == shown.end()) {
+        shown.push_back(&size);
+      }
+    }
+    std::string drawings;
+    for (std::size_t i = 0; i < std::min(shown.size(), most_faults); ++i) {
+      const std::string drawing = size_band(*shown[i], incident.start);
+      if (!drawing.empty()) {
+        const std::string known = commission::sentence(*shown[i]);
+        drawings += "<div><h3>" + escape(core::capital(shown[i]->fault.sentence)) + "</h3>" + drawing +
+                    (known.empty() ? "" : paragraph(escape(core::capital(known)) + ".")) + "</div>";
+      }
+    }
+    if (!drawings.empty()) {
+      out += fmt::format("<h3>Incident {}</h3><div class=\"pairs\">{}</div>", k + 1, drawings);
+    }
+  }
+  return out.empty() ? out
+                     : paragraph(
+                           "How large each fault can have been over time, whether it was a step or not. Dark band: the "
+                           "size at each instant, if it only grew (a step, a ramp, from before the log or not). Bars: "
+                           "the mean of the size over the time that a bar covers, whatever its course; the weights are "
+                           "the way of the wheel, or the filter's kernel, for a lost share times the effort. The "
+                           "dashed line: from here on some fault was there.") +
+                           out;
+}
+
 }  // namespace
 
 std::string detect_report(const Detection& detection, const OnlineModel& model, const ReportContext& context,
@@ -210,6 +252,9 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   }
   if (!isolations.empty()) {
     content.sections.push_back({"isolation", "What it can be", isolation_section(isolations, detection, axis)});
+  }
+  if (std::string sizes = sizes_section(incidents); !sizes.empty()) {
+    content.sections.push_back({"sizes", "How large, over time", std::move(sizes)});
   }
   if (!detection.trace.t.empty()) {
     content.sections.push_back(
@@ -344,6 +389,74 @@ std::string chart_of(const std::vector<Curve>& curves, const model::FaultType& f
 }
 
 }  // namespace
+
+std::string size_band(const detector::SizeOverTime& size, double start) {
+  constexpr double width = 380.0, height = 220.0, left = 56.0, right = 366.0, top = 12.0, bottom = 176.0;
+  const double factor = size.fault.unit == "1" ? 100.0 : 1.0;
+  const std::string unit = size.fault.unit == "1" ? "%" : size.fault.unit;
+  Axis x(left, right), y(bottom, top);
+  // The fault's whole range would dwarf what is known: it is shown to twice the largest amount that is certain or told.
+  double amount = 0.0;
+  const auto known = [&](const Interval& each) {
+    amount = std::max({amount, each.lower, -each.upper});
+    for (const double end : {each.lower, each.upper}) {
+      if (end > 0.99 * size.fault.range.lower && end < 0.99 * size.fault.range.upper) {
+        amount = std::max(amount, std::abs(end));
+      }
+    }
+  };
+  for (const detector::SizeAt& at : size.growing) {
+    x.take(at.t);
+    known(at.size);
+  }
+  for (const detector::MeanSize& mean : size.means) {
+    x.take(mean.from);
+    x.take(mean.to);
+    known(mean.size);
+  }
+  if (x.empty() || !(amount > 0.0)) {
+    return {};
+  }
+  x.take(start);
+  for (const double end : {-2.0 * amount, 2.0 * amount}) {
+    y.take(factor * std::clamp(end, size.fault.range.lower, size.fault.range.upper));
+  }
+  y.take(0.0);
+  const auto at = [&](double value) { return y.inside(factor * value); };
+  std::string out = open_svg(width, height, "size of the fault over time");
+  for (const double tick : y.ticks()) {
+    out += fmt::format("<path d=\"M{:.1f} {:.1f} H{:.1f}\" style=\"stroke:var(--pale)\"/>", left, y(tick), right) +
+           svg_text(left - 5.0, y(tick) + 4.0, "end", number(tick, 3));
+  }
+  for (const double tick : x.ticks()) {
+    out += svg_text(x(tick), bottom + 16.0, "middle", number(tick, 4));
+  }
+  out += svg_text(0.5 * (left + right), bottom + 34.0, "middle", "time, s") + svg_text(left, top - 2.0, "end", unit);
+  if (!size.growing.empty()) {
+    std::string upper, lower;
+    for (const detector::SizeAt& each : size.growing) {
+      upper += fmt::format("{}{:.1f} {:.1f}", upper.empty() ? "M" : " L", x(each.t), at(each.size.upper));
+      lower = fmt::format(" L{:.1f} {:.1f}", x(each.t), at(each.size.lower)) + lower;
+    }
+    out += "<path d=\"" + upper + lower +
+           " Z\" style=\"fill:var(--first);fill-opacity:0.35;stroke:var(--first);stroke-width:1\"/>";
+  }
+  // Of means that lie over each other every so many.
+  constexpr std::size_t most_bars = 60;
+  const std::size_t every = size.means.size() / most_bars + 1;
+  for (std::size_t k = 0; k < size.means.size(); k += every) {
+    const detector::MeanSize& mean = size.means[k];
+    const double high = at(mean.size.upper), low = at(mean.size.lower);
+    out += fmt::format(
+        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" "
+        "style=\"fill:var(--second);fill-opacity:0.12\"/><path d=\"M{:.1f} {:.1f} V{:.1f}\" "
+        "style=\"stroke:var(--second);stroke-width:1.5\"/>",
+        x(mean.from), high, std::max(0.5, x(mean.to) - x(mean.from)), std::max(0.5, low - high), x(mean.to), high, low);
+  }
+  return out +
+         fmt::format("<path d=\"M{0:.1f} {1:.1f} V{2:.1f}\" style=\"stroke:var(--ink);stroke-dasharray:4 3\"/></svg>",
+                     x(start), top, bottom);
+}
 
 std::string delay_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey) {
   std::vector<Curve> curves;

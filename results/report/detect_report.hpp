@@ -42,6 +42,11 @@ struct KinematicFindings {
                                         const std::string& undecided = {},
                                         const commission::OtherParameters* other = nullptr);
 
+/// What is known of the size of a fault over time: the band of one that only grows, and the intervals of weighted means
+/// of one of any course as bars over what they are means of; from `start` on the robot was not healthy. Empty where
+/// nothing is known.
+[[nodiscard]] std::string size_band(const detector::SizeOverTime& size, double start);
+
 /// Smallest certain size over the delay, both logarithmic: for each manoeuvre the median over its onsets, and the size
 /// that is certain at every one of them (thin). Empty where nothing is certain.
 [[nodiscard]] std::string delay_curves(const detector::FaultMargins& margins, const commission::MarginSurvey& survey);

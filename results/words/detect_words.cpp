@@ -121,8 +121,50 @@ std::vector<std::string> detect_words(const Detection& detection, const OnlineMo
   return out;
 }
 
+namespace {
+
+constexpr std::size_t kMostOthers = 3;  // that are written out
+
+// What is known of the size of the first candidate whether it is a step or not; empty where nothing was asked.
+std::string any_course(const detector::Incident& incident) {
+  if (incident.sizes.empty()) {
+    return {};
+  }
+  std::string text = fmt::format(" (whether it is a step or not: present no later than {:.2f} s", incident.start);
+  const auto size = std::ranges::find(incident.sizes, incident.candidates.front().finding.fault.name,
+                                      [](const detector::SizeOverTime& s) { return s.fault.name; });
+  if (size != incident.sizes.end()) {
+    const std::string known = commission::sentence(*size);
+    text += (known.empty() ? "" : "; " + known) + (size->growing_excluded ? "; its size fell at some time" : "");
+  }
+  return text + ")";
+}
+
+// Faults that explain it if they grow, and not as steps.
+std::string only_as_growing(const detector::Incident& incident) {
+  std::vector<std::string> names;
+  for (const detector::SizeOverTime& size : incident.sizes) {
+    const bool candidate = std::ranges::any_of(incident.candidates, [&](const detector::IncidentCandidate& c) {
+      return c.finding.fault.name == size.fault.name;
+    });
+    if (!candidate && !size.growing_excluded && !size.growing.empty()) {
+      const std::string known = commission::sentence(size);
+      names.push_back(size.fault.sentence + (known.empty() ? "" : ", " + known));
+    }
+  }
+  if (names.empty()) {
+    return {};
+  }
+  const std::size_t shown = std::min(names.size(), kMostOthers);
+  return fmt::format("; as a fault that grows also possible: {}{}",
+                     fmt::join(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(shown), "; "),
+                     names.size() > shown ? fmt::format("; and {} more", names.size() - shown) : "");
+}
+
+}  // namespace
+
 std::string incident_sentence(const detector::Incident& incident) {
-  constexpr std::size_t most = 3;  // others that are written out
+  constexpr std::size_t most = kMostOthers;
   std::vector<std::string> faults;
   for (const detector::IncidentCandidate& candidate : incident.candidates) {
     faults.push_back(commission::sentence(candidate.finding) +
@@ -146,7 +188,7 @@ std::string incident_sentence(const detector::Incident& incident) {
             : none_at_risk  ? "at the stated risk no fault that was examined, each as one that stays; for certain not "
                               "excluded: "
                             : "") +
-           faults.front();
+           faults.front() + any_course(incident);
     if (shown > 1) {
       text += fmt::format("; {}{}", none_at_risk && incident.stays ? "" : "also possible: ",
                           fmt::join(faults.begin() + 1, faults.begin() + shown, "; "));
@@ -155,6 +197,7 @@ std::string incident_sentence(const detector::Incident& incident) {
       text += fmt::format("; and {} more", faults.size() - shown);
     }
   }
+  text += only_as_growing(incident);
   text += fmt::format(" ({} from {:.2f} to {:.2f} s", plural(incident.events, "event"), incident.start, incident.end);
   if (!faults.empty() && incident.unexplained > 0) {
     text += fmt::format(", {} of them explained by no fault that was examined", incident.unexplained);

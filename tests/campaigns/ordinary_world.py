@@ -39,6 +39,7 @@ class Robot:
     heavier: float = 1.0  # factor on the mass from the middle of the log on
     worn: float = 1.0  # factor on the radius of the left wheel
     worn_late: float = 1.0  # another one, from the middle of the log on
+    course: np.ndarray = None  # another one, every TABLE s
     phase: float = 0.0
     top: float = 0.0  # m/s that is meant to be reached
     fine: int = 0  # integration steps a sample
@@ -128,6 +129,11 @@ def simulate(robots):
 
     d_v, d_w, g_v, g_w = coefficients(of["mass"])
     radii, half = of["radius"] * np.array([np.ones(many), of["worn"]]), of["track"] / 2
+    courses = any(r.course is not None for r in robots)
+    course = np.ones((size, many))
+    for i, r in enumerate(robots):
+        if r.course is not None:
+            course[:, i] = np.interp(np.arange(size), np.arange(len(r.course)), r.course)
     record = np.empty((last.max(), 6, many))
     v, w = np.zeros(many), np.zeros(many)
     angle, sum_e, u = np.zeros((2, many)), np.zeros((2, many)), np.zeros((2, many))
@@ -139,6 +145,14 @@ def simulate(robots):
             now = k >= halves
             d_v, d_w, g_v, g_w = coefficients(np.where(now, of["mass"] * of["heavier"], of["mass"]))
             radii = of["radius"] * np.array([np.ones(many), of["worn"] * np.where(now, of["worn_late"], 1.0)])
+            limit = of["coulomb"] / radii
+            omega = np.array([v + half * w, v - half * w]) / radii
+        if courses:
+            at = np.minimum(k * h / TABLE, size - 1.001)
+            i, part = at.astype(int), at % 1.0
+            now = (1 - part) * course[i, each] + part * course[i + 1, each]
+            late = np.where(k >= halves, of["worn_late"], 1.0)
+            radii = of["radius"] * np.array([np.ones(many), of["worn"] * late * now])
             limit = of["coulomb"] / radii
             omega = np.array([v + half * w, v - half * w]) / radii
         due = (k + phase) % period == 0
@@ -174,6 +188,8 @@ def body(true, robot):
     """x, y (m), theta (rad), yaw rate (rad/s) of the true motion."""
     late = np.arange(len(true["t"])) >= len(true["t"]) // 2
     worn = robot.worn * np.where(late, robot.worn_late, 1.0)
+    if robot.course is not None:
+        worn = worn * np.interp(true["t"], TABLE * np.arange(len(robot.course)), robot.course)
     left = np.cumsum(np.diff(true["phi_l"], prepend=0.0) * np.roll(worn, 1))
     theta = (true["phi_r"] - left) * robot.radius / robot.track
     way = (true["phi_r"] + left) * robot.radius / 2
