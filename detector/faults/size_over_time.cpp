@@ -43,11 +43,14 @@ Interval mixed(const Interval& ratio, double share, const Interval& range) {
   return {std::min(ratio.lower, other.lower), std::max(ratio.upper, other.upper)};
 }
 
-// Takes a mean of sizes, in the fault's unit.
+// Takes a mean of sizes, in the fault's unit, where anything is known of it.
 void take_mean(SizeEvidence& out, const Interval& range, double from, double to, const Interval& size) {
   const Interval held{std::max(size.lower, range.lower), std::min(size.upper, range.upper)};
   if (!(held.lower <= held.upper)) {
     out.excluded = true;
+    return;
+  }
+  if (held == range) {
     return;
   }
   if (!out.means.empty() && out.means.back().to == to && out.means.back().from == from) {
@@ -454,6 +457,9 @@ void grow(const FaultType& catalogued, const TorqueRows& in, SizeEvidence& out) 
     const std::size_t row = in.rows[r];
     weights.of(row);
     for (std::size_t i = 0; i < n; ++i) {
+      if (out.sides[0].excluded && out.sides[1].excluded) {
+        return;
+      }
       Interval left = in.left[r * n + i];
       if (bias && in.motion.effort_doubt.rows() > 0) {
         left = wider(

@@ -191,7 +191,7 @@ std::string sizes_section(const std::vector<detector::Incident>& incidents) {
   }
   return out.empty() ? out
                      : paragraph(
-                           "How large each fault can have been over time, whether it was a step or not. Dark band: the "
+                           "How large each fault can have been over time, whether it was a step or not. Band: the "
                            "size at each instant, if it only grew (a step, a ramp, from before the log or not). Bars: "
                            "the mean of the size over the time that a bar covers, whatever its course; the weights are "
                            "the way of the wheel, or the filter's kernel, for a lost share times the effort. The "
@@ -391,7 +391,7 @@ std::string chart_of(const std::vector<Curve>& curves, const model::FaultType& f
 }  // namespace
 
 std::string size_band(const detector::SizeOverTime& size, double start) {
-  constexpr double width = 380.0, height = 220.0, left = 56.0, right = 366.0, top = 12.0, bottom = 176.0;
+  constexpr double width = 380.0, height = 220.0, left = 56.0, right = 356.0, top = 22.0, bottom = 176.0;
   const double factor = size.fault.unit == "1" ? 100.0 : 1.0;
   const std::string unit = size.fault.unit == "1" ? "%" : size.fault.unit;
   Axis x(left, right), y(bottom, top);
@@ -418,20 +418,30 @@ std::string size_band(const detector::SizeOverTime& size, double start) {
     return {};
   }
   x.take(start);
-  for (const double end : {-2.0 * amount, 2.0 * amount}) {
-    y.take(factor * std::clamp(end, size.fault.range.lower, size.fault.range.upper));
+  // Where one sign alone is possible the other has no place.
+  Interval ends{0.0, 0.0};
+  const auto take = [&](const Interval& each) {
+    ends = {std::min(ends.lower, each.lower), std::max(ends.upper, each.upper)};
+  };
+  for (const detector::SizeAt& each : size.growing) {
+    take(each.size);
   }
+  for (const detector::MeanSize& each : size.means) {
+    take(each.size);
+  }
+  y.take(factor * std::max(ends.lower, -2.0 * amount));
+  y.take(factor * std::min(ends.upper, 2.0 * amount));
   y.take(0.0);
   const auto at = [&](double value) { return y.inside(factor * value); };
   std::string out = open_svg(width, height, "size of the fault over time");
   for (const double tick : y.ticks()) {
     out += fmt::format("<path d=\"M{:.1f} {:.1f} H{:.1f}\" style=\"stroke:var(--pale)\"/>", left, y(tick), right) +
-           svg_text(left - 5.0, y(tick) + 4.0, "end", number(tick, 3));
+           svg_text(left - 5.0, y(tick) + 4.0, "end", fmt::format("{:.3g}", tick));
   }
   for (const double tick : x.ticks()) {
-    out += svg_text(x(tick), bottom + 16.0, "middle", number(tick, 4));
+    out += svg_text(x(tick), bottom + 16.0, "middle", fmt::format("{:.5g}", tick));
   }
-  out += svg_text(0.5 * (left + right), bottom + 34.0, "middle", "time, s") + svg_text(left, top - 2.0, "end", unit);
+  out += svg_text(0.5 * (left + right), bottom + 34.0, "middle", "time, s") + svg_text(left, top - 10.0, "end", unit);
   if (!size.growing.empty()) {
     std::string upper, lower;
     for (const detector::SizeAt& each : size.growing) {

@@ -133,6 +133,26 @@ TEST_F(Results, OneFaultIsOneIncidentAndOneSentence) {
   EXPECT_GE(likeliest.at("magnitude").at(1), -0.206);
   EXPECT_TRUE(incident.at("sentence").get<std::string>().starts_with("the left wheel's radius changes by -"))
       << incident.at("sentence");
+  EXPECT_THAT(incident.at("sentence").get<std::string>(),
+              HasSubstr("whether it is a step or not: present no later than"));
+  // It grows smoothly over these two seconds: what is said of its size over time is true at every instant.
+  const auto truth = [](double t) {
+    return -0.02 / 0.0975 * 0.5 * (1.0 - std::cos(std::acos(-1.0) * std::clamp((t - 30.0) / 2.0, 0.0, 1.0)));
+  };
+  bool sized = false;
+  for (const Json& size : incident.at("sizes")) {
+    if (size.at("fault") == "wheel_radius_left") {
+      sized = true;
+      EXPECT_FALSE(size.at("growing_excluded").get<bool>());
+      for (const Json& at : size.at("growing")) {
+        const double t = at.at("t");
+        EXPECT_LE(at.at("lower").get<double>(), truth(t)) << t;
+        EXPECT_GE(at.at("upper").get<double>(), truth(t)) << t;
+      }
+      EXPECT_LT(size.at("growing").back().at("upper").get<double>(), -0.1);
+    }
+  }
+  EXPECT_TRUE(sized);
   std::vector<std::string> changes;
   for (const std::string& line :
        testing::lines_of(run("detect --follow --model model/model.json --json", path("fault.csv")).out)) {

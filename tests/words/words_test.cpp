@@ -222,5 +222,38 @@ TEST(IncidentSentence, BeginsWithWhatTheStatedRiskLeaves) {
   EXPECT_THAT(incident_sentence(incident), testing::StartsWith("nothing of the catalogue"));
 }
 
+// Sizes over time stand beside the candidate, and faults that only growing explains are named.
+TEST(IncidentSentence, TellsSizesOverTime) {
+  const OnlineModel model = example::done().model;
+  const std::vector<model::FaultType> faults = model::fault_catalogue(model.model, Eigen::VectorXd::Ones(4));
+  detector::Incident incident;
+  incident.events = incident.examined = 1;
+  incident.start = 30.91;
+  detector::IncidentCandidate candidate;
+  candidate.finding.fault = faults[0];
+  candidate.finding.verdict = detector::FaultFinding::Verdict::consistent;
+  incident.candidates.push_back(candidate);
+  EXPECT_THAT(incident_sentence(incident), Not(HasSubstr("whether it is a step or not")));
+  incident.sizes.push_back({.fault = faults[0],
+                            .means = {{29.0, 30.0, {-0.1, 0.2}}, {33.0, 34.0, {0.08, 0.12}}, {35.0, 36.0, {0.01, 0.3}}},
+                            .growing = {{31.0, {0.0, 0.2}}, {40.0, {0.11, 0.15}}, {41.0, {0.111, 0.4}}}});
+  EXPECT_THAT(incident_sentence(incident),
+              AllOf(HasSubstr("whether it is a step or not: present no later than 30.91 s"),
+                    HasSubstr("whatever its course by 8.0 to 12.0 % on average over the 1.00 s before 34.00 s"),
+                    HasSubstr("if it only grew by 11.0 to 15.0 % at 40.00 s")));
+  EXPECT_THAT(incident_sentence(incident), Not(HasSubstr("as a fault that grows")));
+  incident.sizes.push_back({.fault = faults[2], .growing = {{31.0, {-0.3, -0.1}}}});
+  EXPECT_THAT(incident_sentence(incident),
+              HasSubstr("as a fault that grows also possible: " + faults[2].sentence + ", if it only grew by -30.0"));
+  incident.sizes.back().growing_excluded = true;
+  EXPECT_THAT(incident_sentence(incident), Not(HasSubstr("as a fault that grows")));
+  // The page draws them.
+  const std::string page =
+      report::detect_report(example::detection(900, true), model, example::context(900), {}, {}, {}, {incident});
+  EXPECT_TRUE(example::holds(page, {"How large, over time", "size of the fault over time"}));
+  EXPECT_THAT(report::size_band(incident.sizes.front(), 30.91), AllOf(Not(HasSubstr("nan")), Not(HasSubstr("inf"))));
+  EXPECT_EQ(report::size_band({.fault = faults[0]}, 3.0), "");
+}
+
 }  // namespace
 }  // namespace wheelwright::words
