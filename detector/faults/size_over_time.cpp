@@ -475,6 +475,9 @@ void grow(const FaultType& catalogued, const TorqueRows& in, SizeEvidence& out) 
         const Interval e = k == 0 ? left : Interval{-left.upper, -left.lower};
         const StepResponses::Range& s = responded[k];
         const double t = in.motion.instant[row], most = s.most, least = -s.least;
+        if (!std::isfinite(most) || !std::isfinite(least)) {
+          continue;
+        }
         if (e.lower > core::round_up(amount * most) || e.upper < -core::round_up(amount * least)) {
           side.excluded = true;
           continue;
@@ -775,9 +778,9 @@ class Rolling {
         const double h = motion.t[k + 1] - motion.t[k];
         const double d = motion.joint_angle(at, a + 1) - motion.joint_angle(at, a);
         const double error = speeds ? in_.errors.motion * h : 2.0 * in_.errors.motion;
-        const double within = error + 0.5 * in_.errors.acceleration * h * h, most = std::abs(d) + within;
+        const double most = std::abs(d) + error;
         const double e = along ? 0.5 * direction(k, from, i)[0] : (w == 0 ? 1.0 : -1.0);
-        const double way = d > within ? 1.0 : d < -within ? -1.0 : 0.0;
+        const double way = d > error ? 1.0 : d < -error ? -1.0 : 0.0;
         if (way != 0.0) {
           runs += way != before ? 1.0 : 0.0;
           known += std::abs(d);

@@ -17,8 +17,9 @@
 /// - a share of an effort that is lost: the effort as it was logged, filtered: the rest of it, u(1 − m), is what
 ///   drives, so that the residual is ∫ f u m, and errors of u count as a healthy robot's, since 1 − m is in [0, 1];
 /// - an effort's bias: the filter's own kernel;
-/// - radius, slip in per cent, encoder, by the kinematic residual: the way that the wheel rolled in the row's window; a
-///   slip in m/s or rad/s: time. Rows whose weights turn with the robot (E_j of odometry_filter.hpp) have weights w =
+/// - radius, slip in per cent, encoder, by the kinematic residual: the ways that the wheel rolled from sample to sample
+///   in the row's window (the class: in a step in which it turns back the size stays as it is); a slip in m/s or rad/s:
+///   time. Rows whose weights turn with the robot (E_j of odometry_filter.hpp) have weights w =
 ///   c|w| + d, and ∫ d κ is bounded by the range.
 ///
 /// **Growing**: the size has one sign and its amount never falls (a step, a ramp, stairs, from before the log or not).

@@ -98,7 +98,11 @@ def true_mean(fault, log, size, begin, end, design):
     if fault.startswith("effort") and np.any(log.lost & (stamps >= begin) & (stamps <= end)):
         return None  # rows that are lost have weights of their own
     if fault in ("wheel_radius_left", "encoder_scale_left"):
-        weights = np.abs(np.diff(log.true["phi_l"], append=log.true["phi_l"][-1]))
+        step = np.diff(log.true["phi_l"], append=log.true["phi_l"][-1])
+        # From row to row: the sign of the way between them.
+        at = np.searchsorted(t, stamps[~log.lost] - 1e-9)
+        signs = np.sign(np.diff(log.true["phi_l"][at]))
+        weights = step * signs[np.clip(np.searchsorted(at, np.arange(len(t)), "right") - 1, 0, len(signs) - 1)]
     else:
         weights = np.interp(end - t, (end - stamps)[::-1], kernel(end - stamps, 1 / log.robot.rate, design)[::-1])
         if fault == "effort_loss_left":
