@@ -304,7 +304,7 @@ TEST_P(SizesOfRadii, HoldTheTrueMeansAndSizes) {
       }
     }
   }
-  EXPECT_GT(kinematic.means, 300U);
+  EXPECT_GT(kinematic.means, 100U);
   EXPECT_GT(kinematic.told, 50U);
   EXPECT_GT(torque.sizes, 300U);
 }
