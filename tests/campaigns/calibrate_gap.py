@@ -6,7 +6,8 @@
     calibrate_gap.py --judge ANSWERS.json RESULTS [...]                what gap.json promises, against truth
 
 The first counts diagnoses by verdict and number of causes (the table of gap/causes/confidence.cpp) and judges each world by
-the others: what the rest promises for its answers, and what came of it. Names are exact; a payload with the shift of
+the others: what the rest promises for its answers, and what came of it. Answers are compared as gap.json numbers them:
+laws of one family are one cause, what is a trifle is none, and sets of one answer are one; a payload with the shift of
 the centre that it makes is a payload off the middle.
 """
 
@@ -15,7 +16,7 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
-from score_withheld import exact, load
+from score_withheld import exact, families, load
 
 OUTCOMES = ("first", "other", "neither")
 
@@ -29,9 +30,9 @@ class Record:
 
     def add(self, gap, truth):
         self.of[outcome(gap, truth)] += 1
-        named = {cause["effect"] for cause in gap["causes"]}
+        named = families(cause["effect"] for cause in gap["causes"])
         self.causes += len(named)
-        self.present += len(named & truth)
+        self.present += len(named & families(truth))
 
     def logs(self):
         return sum(self.of.values())
@@ -61,14 +62,20 @@ def truth_of(answer):
 
 
 def same(effects, truth):
-    return exact(effects) == exact(truth)
+    return families(exact(effects)) == families(exact(truth))
+
+
+def said_by(member):
+    """The causes of a set of the credible set, but for those whose share of the gap is nothing."""
+    return [effect for effect in member["effects"] if effect not in member.get("trifles", [])]
 
 
 def outcome(gap, truth):
-    sets = [member["effects"] for member in gap["credible_set"]] or [[]]
-    if same(sets[0], truth):
-        return "first"
-    return "other" if any(same(effects, truth) for effects in sets[1:]) else "neither"
+    sets = gap["credible_set"] or [{"effects": []}]
+    right = {member.get("answer", number) for number, member in enumerate(sets) if same(said_by(member), truth)}
+    if not right:
+        return "neither"
+    return "first" if sets[0].get("answer", 0) in right else "other"
 
 
 def diagnoses(pairs):
@@ -133,7 +140,7 @@ def judge(pairs, out):
         for cause in gap["causes"]:
             if cause.get("probability") is not None:
                 bins["causes of the verdict"][min(int(10 * cause["probability"]), 9)].append(
-                    (cause["probability"], cause["effect"] in truth))
+                    (cause["probability"], bool(families([cause["effect"]]) & families(truth))))
     print("| world | logs | first: promised | came | listed at all: promised | came |\n|---|---|---|---|---|---|",
           file=out)
     for world, values in worlds.items():
