@@ -13,6 +13,7 @@
 
 #include "gap/where.hpp"
 #include "results/report/drawing.hpp"
+#include "results/words/gap_words.hpp"
 #include "results/words/text.hpp"
 
 namespace wheelwright::report {
@@ -94,6 +95,31 @@ std::string shrink_bars(const std::vector<gap::ShrinkFigure>& figures) {
       bar(f.floor, "floor", "style=\"fill:var(--tolerance);stroke:var(--bound)\"", "");
     }
     y += group - 2.0 * (height + 2.0);
+  }
+  return out + "</svg>";
+}
+
+std::string step_bars(const Diagnosis& d) {
+  const std::vector<GapStep> steps = gap_steps(d);
+  if (steps.empty()) {
+    return {};
+  }
+  std::size_t longest_name = 0;
+  for (const GapStep& step : steps) {
+    longest_name = std::max(longest_name, step.name.size());
+  }
+  const double left = std::clamp(5.8 * static_cast<double>(longest_name) + 12.0, 110.0, 280.0), longest = 300.0,
+               row = 20.0;
+  std::string out = open_svg(left + longest + 60.0, row * static_cast<double>(steps.size()) + 8.0,
+                             "the gap before, what each cause takes off it, and after");
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const GapStep& step = steps[k];
+    const double y = 4.0 + row * static_cast<double>(k);
+    out += svg_text(left - 8.0, y + 11.5, "end", step.name, true);
+    out += rectangle(left + longest * step.from, y, std::max(0.8, longest * (step.to - step.from)), 14.0,
+                     k == 0 ? "class=\"bar open\"" : "class=\"full\"");
+    out += svg_text(left + longest + 12.0, y + 11.5, "start", fmt::format("{:.0f} %", 100.0 * (step.to - step.from)),
+                    true);
   }
   return out + "</svg>";
 }

@@ -94,7 +94,8 @@ std::string causes_section(const Diagnosis& d) {
                       parameter_lines(law.parameters)});
     }
   }
-  return table({"Cause", "name", numeric("share of<br>the gap"), numeric("chance that<br>it is there"),
+  return step_bars(d) +
+         table({"Cause", "name", numeric("share of<br>the gap"), numeric("chance that<br>it is there"),
                 "parameters [95 % interval]"},
                rows) +
          note(fmt::format("The gap is what {} leaves above the noise floor: {} of the "

@@ -17,6 +17,10 @@ namespace wheelwright::report {
 /// numbers beside them. Empty for no figures.
 [[nodiscard]] std::string shrink_bars(const std::vector<gap::ShrinkFigure>& figures);
 
+/// The steps of words::gap_steps() as bars on one scale, each cause's where it takes off what the one above it left:
+/// dashed before, full for causes and after. Empty for a diagnosis without causes.
+[[nodiscard]] std::string step_bars(const Diagnosis& diagnosis);
+
 /// One bar for each share, at most `most`, with a tick at its presence: full where it is a finding, pale where chance
 /// would do. Empty for no shares.
 [[nodiscard]] std::string share_bars(const std::vector<gap::GapShare>& shares, std::size_t most = 16);

@@ -39,6 +39,28 @@ std::string causes_words(const Diagnosis& d) {
   return out;
 }
 
+// The steps from before to after as bars on one scale, each cause's where it takes off what the one above it left.
+std::string bars_words(const Diagnosis& d) {
+  constexpr double kCells = 30.0;
+  const std::vector<words::GapStep> steps = words::gap_steps(d);
+  std::size_t longest = 0;
+  for (const words::GapStep& step : steps) {
+    longest = std::max(longest, step.name.size());
+  }
+  std::string out;
+  for (const words::GapStep& step : steps) {
+    const auto from = static_cast<int>(std::lround(kCells * step.from)),
+               to = static_cast<int>(std::lround(kCells * step.to));
+    std::string bar(static_cast<std::size_t>(from), ' ');
+    for (int k = from; k < to; ++k) {
+      bar += "█";
+    }
+    bar += from == to && step.to > step.from ? "▏" : "";
+    out += fmt::format("  {:<{}}  {:<30} {:>4.0f} %\n", step.name, longest, bar, 100.0 * (step.to - step.from));
+  }
+  return out;
+}
+
 std::string figures_words(const std::vector<gap::ShrinkFigure>& figures, const std::string& what) {
   std::string out;
   for (const gap::ShrinkFigure& f : figures) {
@@ -113,6 +135,8 @@ std::string summary(const Diagnosis& d, const GapResults& r) {
   for (const std::string& sentence : words::gap_sentences(d, {})) {
     out += sentence + "\n";
   }
+  out += titled(gap::answers_among(d.credible) > 1 ? "the gap by cause, those of the first answer" : "the gap by cause",
+                bars_words(d));
   out += titled("causes, 95 % intervals", causes_words(d));
   out += titled("held out, before → after the causes are in the model",
                 figures_words(d.shrink.torque_rms, "torque residual") +

@@ -405,6 +405,28 @@ std::vector<std::string> gap_sentences(const Diagnosis& d, const std::string& ne
   return out;
 }
 
+std::vector<GapStep> gap_steps(const Diagnosis& d) {
+  constexpr double kTold = 0.01;
+  if (d.causes.empty()) {
+    return {};
+  }
+  std::vector<GapStep> steps{{"before", 0.0, 1.0}};
+  double left = 1.0;
+  const auto take = [&](const std::string& name, double share) {
+    const double rest = std::clamp(left - share, 0.0, 1.0);
+    steps.push_back({name, rest, left});
+    left = rest;
+  };
+  for (const gap::GapCause& cause : d.causes) {
+    take(cause_noun(cause), cause.share);
+  }
+  if (left - d.remaining >= kTold) {
+    take("other parameters, without a cause", left - d.remaining);
+  }
+  steps.push_back({"after", 0.0, d.remaining});
+  return steps;
+}
+
 std::string in_words(std::string text, const std::vector<Effect>& catalogue) {
   const auto of_a_name = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
   std::string out;

@@ -40,6 +40,18 @@ namespace wheelwright::words {
 /// apart. `next_manoeuvre` is the sentence of the drive that would, or empty.
 [[nodiscard]] std::vector<std::string> gap_sentences(const Diagnosis& diagnosis, const std::string& next_manoeuvre);
 
+/// A step from the gap before its causes are in the model to what they leave, as a span of the gap: 0 is none, 1 all.
+struct GapStep {
+  std::string name;
+  double from = 0.0;
+  double to = 0.0;
+};
+
+/// "before" (all of the gap), what each cause takes off it, largest first, each from where the one before it left off;
+/// what other parameters without a cause would take, where that is at least a per cent; and "after", what is left. The
+/// first answer's where there are several. Empty for a diagnosis without causes.
+[[nodiscard]] std::vector<GapStep> gap_steps(const Diagnosis& diagnosis);
+
 /// Root mean square of the left side of `channel`, so that residuals can be told in per cent of it; 0 where there is no
 /// such series.
 [[nodiscard]] double signal_rms(const Diagnosis& diagnosis, std::string_view channel);

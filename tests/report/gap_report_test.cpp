@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -52,6 +53,30 @@ TEST(GapWords, EachVerdictHasItsOwnWords) {
   Diagnosis nothing = gap_example::unexplained();
   nothing.causes.clear();
   EXPECT_TRUE(example::holds(all_sentences(nothing), {"no effect of the catalogue explains it"}));
+}
+
+// From all of the gap each step takes off what the one before it left, down to what stays.
+TEST(GapWords, StepsGoFromAllOfTheGapToWhatIsLeft) {
+  for (Diagnosis d :
+       {gap_example::explained(), gap_example::two_causes(), gap_example::late_torque(), gap_example::unexplained()}) {
+    const std::vector<GapStep> steps = gap_steps(d);
+    ASSERT_GE(steps.size(), d.causes.size() + 2);
+    EXPECT_EQ(steps.front().to - steps.front().from, 1.0);
+    double left = 1.0;
+    for (std::size_t k = 1; k + 1 < steps.size(); ++k) {
+      EXPECT_EQ(steps[k].to, left);
+      left = steps[k].from;
+      if (k <= d.causes.size()) {
+        EXPECT_NEAR(steps[k].to - steps[k].from, d.causes[k - 1].share, 1e-12);
+      }
+    }
+    EXPECT_EQ(steps.back().from, 0.0);
+    EXPECT_EQ(steps.back().to, d.remaining);
+    EXPECT_NEAR(left, d.remaining, 0.01);
+    EXPECT_EQ(times(step_bars(d), "<rect"), steps.size());
+  }
+  EXPECT_TRUE(gap_steps(gap_example::no_gap()).empty());
+  EXPECT_TRUE(step_bars(gap_example::no_gap()).empty());
 }
 
 TEST(GapWords, LawsOfAFamilyAreOneCause) {
