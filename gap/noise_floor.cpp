@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -170,6 +171,37 @@ NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta
     floor.increments.yaw = std::hypot(floor.increments.yaw, yaw);
   }
   return floor;
+}
+
+void draw_effort_noise(Drive& drive, const SignalNoise& noise, const NoiseFloor& floor, double beta,
+                       std::uint64_t seed) {
+  constexpr double kNegligible = 0.02, kFloorKnown = 1.25;  // of the floors' squares
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  for (std::size_t j = 0; j < drive.joints.size(); ++j) {
+    Eigen::VectorXd& draw = drive.joints[j].effort_noise;
+    draw.resize(drive.has_efforts ? drive.rows() : 0);
+    for (double& value : draw) {
+      value = noise.effort[static_cast<Eigen::Index>(j)] * normal(generator);
+    }
+  }
+  if (!drive.has_efforts) {
+    return;
+  }
+  const std::vector<Eigen::VectorXd> without = filtered_outputs(drive, beta),
+                                     with = filtered_outputs(with_effort_noise(drive), beta);
+  const Mask use = settled(drive, beta);
+  double share = 0.0;
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    const double ratio = root_mean_square(with[i] - without[i], use) / floor.efforts[static_cast<Eigen::Index>(i)];
+    share += ratio * ratio / static_cast<double>(with.size());
+  }
+  for (JointSignals& joint : drive.joints) {
+    joint.effort_noise *= std::sqrt(std::min(1.0, kFloorKnown / share));
+    if (!(share > kNegligible)) {
+      joint.effort_noise.resize(0);
+    }
+  }
 }
 
 double attenuation(const Drive& drive, const SignalNoise& noise, double beta) {

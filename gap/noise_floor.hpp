@@ -3,6 +3,8 @@
 /// Noise of a drive's signals and the floor that it makes of the filtered rows, without any fit.
 #pragma once
 
+#include <cstdint>
+
 #include <Eigen/Core>
 
 #include "gap/rows/drive.hpp"
@@ -28,6 +30,12 @@ struct SignalNoise {
 /// itself leaves is in it: signals are taken as linear between instants, which only matters where there is next to no
 /// noise.
 [[nodiscard]] NoiseFloor noise_floor(const Drive& drive, const SignalNoise& noise, double beta, double window = 0.5);
+
+/// Draws JointSignals::effort_noise of `drive`: white, of the standard deviations of `noise`, but less where behind f₂
+/// at `beta` it would be more than the `floor` is known to, in the mean of the outputs: then what looks like noise of
+/// the efforts moves the robot. None where it is next to nothing of the floor, or the drive has no efforts.
+void draw_effort_noise(Drive& drive, const SignalNoise& noise, const NoiseFloor& floor, double beta,
+                       std::uint64_t seed);
 
 /// By which share the noise of the motion lowers least-squares estimates of inertia: variance of the noise in the
 /// filtered accelerations over that of the filtered accelerations, the largest of all coordinates.

@@ -332,6 +332,50 @@ std::optional<HealthyMisfit> misfit_of(const Drive& drive, const GapRows& rows,
   return misfit;
 }
 
+// Whether an effect that robots have as they are built is fitted by this candidate: of effects of one wheel or of both
+// with opposite signs by the latter, whose mean is θ's.
+bool is_as_built(const Candidate& candidate, const Effect& effect) {
+  return effect.as_built && !effect.free_form && (effect.shapes.empty() || candidate.shape == std::vector{2.0});
+}
+
+// `set` with those effects that robots have as they are built that the log tells from nothing: of three standard errors
+// or more beside all others, which of three effects that are not there one is on one log in fifty (Student's t of 24
+// blocks). Another drive would make more of an error than this one.
+CauseSet with_as_built(const CauseSet& set, const CandidateTable& table, const std::vector<Effect>& catalogue) {
+  constexpr double kTold = 3.0;
+  std::vector<std::size_t> members = set.members, added;
+  const auto has = [&](const Effect& effect) {
+    return std::ranges::any_of(set.members, [&](std::size_t c) {
+      const Effect& member = catalogue[table.candidates[c].effect];
+      return member.name == effect.name || std::ranges::find(member.stands_for, effect.name) != member.stands_for.end();
+    });
+  };
+  for (std::size_t c = 0; c < table.candidates.size(); ++c) {
+    const Effect& effect = catalogue[table.candidates[c].effect];
+    if (is_as_built(table.candidates[c], effect) && !has(effect)) {
+      added.push_back(c);
+    }
+  }
+  while (!added.empty()) {
+    std::vector<std::size_t> all = members;
+    all.insert(all.end(), added.begin(), added.end());
+    std::ranges::sort(all);
+    const Subset subset = subset_of(table, all, BaseModel::refitted);
+    const BlockFit fit = table.gram->fit(subset);
+    const auto times_its_error = [&](std::size_t c) {
+      const auto at = std::ranges::find(subset.columns, table.candidates[c].columns.front()) - subset.columns.begin();
+      const double variance = fit.covariance(at, at);
+      return variance > 0.0 ? std::abs(fit.coefficients[at]) / std::sqrt(variance) : 0.0;
+    };
+    const auto least = std::ranges::min_element(added, {}, times_its_error);
+    if (times_its_error(*least) >= kTold) {
+      return evaluate(table, std::move(all), BaseModel::refitted);
+    }
+    added.erase(least);
+  }
+  return set;
+}
+
 // θ, floor and effects of the healthy robot, or of the simulator.
 void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   Drive& drive = *prepared.healthy_drive;
@@ -347,6 +391,7 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
     floor_by_sensors(prepared);
     sensors = together(sensors, prepared.floor);
   }
+  draw_effort_noise(drive, signal_noise(drive), sensors, beta, options.seed);
   GapProblem problem = make_problem(drive, sensors, {}, std::vector<bool>(drive.model.p(), false), prepared.catalogue,
                                     all_shapes(prepared.catalogue, drive), prepared.row_options);
   BlockOptions blocks = options.blocks;
@@ -357,18 +402,23 @@ void learn_healthy(PreparedGap& prepared, const DiagnoseOptions& options) {
   SelectionOptions selection = options.selection;
   selection.threads = options.threads;
   const Selection found = select_causes(problem.table, problem.kinds, false, 1.0, selection);
-  const Subset subset = subset_of(problem.table, found.structural.members, BaseModel::refitted);
+  const CauseSet own =
+      simulated ? found.structural : with_as_built(found.structural, problem.table, prepared.catalogue);
+  const Subset subset = subset_of(problem.table, own.members, BaseModel::refitted);
   const BlockFit fit = gram.fit(subset);
   prepared.theta += fit.coefficients.head(prepared.theta.size());
-  prepared.healthy = fitted_effects(problem.table, found.structural, fit, prepared.catalogue);
+  prepared.healthy = fitted_effects(problem.table, own, fit, prepared.catalogue);
   std::vector<std::size_t> places;
-  for (const std::size_t c : found.structural.members) {
+  for (const std::size_t c : own.members) {
     places.push_back(problem.table.candidates[c].effect);
   }
   constexpr double kFarAbove = 4.0;  // floors
   const std::vector<std::string> helping =
-      fit.held_out_error > kFarAbove ? helping_beside(found.structural, problem.table) : std::vector<std::string>();
+      fit.held_out_error > kFarAbove ? helping_beside(own, problem.table) : std::vector<std::string>();
   BaselineFit last{std::move(problem), subset, fit};
+  for (JointSignals& joint : drive.joints) {
+    joint.effort_noise.resize(0);  // the floor is what is left, whatever the effects took of the noise
+  }
   settle(prepared, places, sensors, blocks, last);
   std::vector<Eigen::VectorXd> left = residuals(last.problem.rows, last.subset, last.fit.coefficients);
   const FittedEffect timing = timing_of(drive, last.problem.rows, left, prepared.row_options);
@@ -591,10 +641,15 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
   const Drive& noisy = prepared.reference == GapReference::healthy_log ? *prepared.healthy_drive : prepared.drive;
   const double wish = options.beta ? *options.beta : kUsualBeta;
   prepared.row_options.beta = options.beta ? *options.beta : choose_gap_beta(noisy, signal_noise(noisy), wish);
+  const auto draw_noise = [&] {
+    draw_effort_noise(prepared.drive, signal_noise(prepared.drive), prepared.floor, prepared.row_options.beta,
+                      options.seed);
+  };
   if (prepared.healthy_drive) {
     learn_healthy(prepared, options);
     prepared.trusted.assign(model.p(), true);
     predict_efforts(prepared.drive, prepared.theta);
+    draw_noise();
     return prepared;
   }
   prepared.theta = fit_base(prepared.drive, prepared.row_options.beta);
@@ -608,6 +663,7 @@ PreparedGap prepare_gap(LogSource& log, LogSource* baseline, const Robot& robot,
   }
   predict_efforts(prepared.drive, prepared.theta);
   floor_by_sensors(prepared);
+  draw_noise();
   return prepared;
 }
 

@@ -167,6 +167,7 @@ Effect viscous_asymmetric() {
   return {.name = "viscous_asymmetric",
           .sentence = "More viscous friction at one wheel than at the other.",
           .common = "viscous",
+          .as_built = true,
           .parameters = {{"damping", "N·m·s/rad", 0}},
           .shapes = {side_or_opposite()},
           .excite = "drive straight at different steady speeds, with the pose logged",

@@ -47,6 +47,7 @@ EffectParameter armature_change() { return {"armature_change", "kg·m²", 0, tru
 Effect com_longitudinal() {
   return {.name = "com_longitudinal",
           .sentence = "The centre of mass lies before or behind the axle.",
+          .as_built = true,
           .parameters = {{"a", "m", 0}, {"inertia_change", "1", 0, true}},
           .excite = "drive fast curves of changing radius",
           .measured_by = DirectMeasurement::weight,
@@ -65,6 +66,7 @@ Effect com_longitudinal() {
 Effect com_lateral() {
   return {.name = "com_lateral",
           .sentence = "The centre of mass lies to the left or right of the middle.",
+          .as_built = true,
           .parameters = {{"b", "m", 0}, {"inertia_change", "1", 0, true}},
           .excite = "accelerate and brake hard on a straight line",
           .measured_by = DirectMeasurement::weight,

@@ -96,6 +96,8 @@ struct Effect {
   std::vector<std::string> stands_for{};  ///< effects that this one is together: a load off the middle adds mass and
                                           ///< shifts its centre. Where these do as well it is one cause
   bool parametric = false;                ///< moves θ or the kinematic scale of the base model
+  bool as_built = false;                  ///< every robot has a little of it as it is built: on a log of the healthy
+                                          ///< robot it is fitted though it would be no cause there
   std::vector<EffectParameter> parameters{};  ///< one for each column
   std::vector<ShapeParameter> shapes{};       ///< on which the columns depend nonlinearly
   bool unit_coefficient = false;  ///< the one column's coefficient is 1; `parameters` is empty, the shapes are

@@ -153,11 +153,7 @@ namespace {
 constexpr Eigen::Index kChunk = 128;   // rows at a time: what is multiplied stays in the cache
 constexpr double kDetermined = 1e-10;  // share of a squared column that the ones before it must leave
 
-// Half-open rows of one space.
-struct Range {
-  Eigen::Index first = 0;
-  Eigen::Index last = 0;
-};
+using Range = SpaceRange;
 
 Eigen::Index first_at(const Eigen::VectorXd& t, double from) {
   return std::lower_bound(t.data(), t.data() + t.size(), from) - t.data();
@@ -177,33 +173,40 @@ void check_spaces(const std::vector<RowSpace>& spaces) {
     check::that(space.response.size() == space.t.size(), what + " response", "one value per row");
     check::that(space.response.allFinite() && space.t.allFinite(), what, "finite values");
     check::that(std::is_sorted(space.t.data(), space.t.data() + space.t.size()), what + " t", "ascending times");
-    for (const Eigen::VectorXd& column : space.columns) {
-      check::that(column.size() == 0 || column.size() == space.t.size(), what + " column",
-                  "one value per row, or none");
-      check::that(column.allFinite(), what + " column", "finite values");
-    }
+    const auto check_column = [&](const Eigen::VectorXd& column, const char* name) {
+      check::that(column.size() == 0 || column.size() == space.t.size(), what + name, "one value per row, or none");
+      check::that(column.allFinite(), what + name, "finite values");
+    };
+    std::ranges::for_each(space.columns, [&](const Eigen::VectorXd& column) { check_column(column, " column"); });
+    check_column(space.noise, " noise");
+    check::that(space.noise_columns.size() <= space.columns.size(), what + " noise_columns", "at most one per column");
+    std::ranges::for_each(space.noise_columns, [&](const Eigen::VectorXd& c) { check_column(c, " noise column"); });
   }
 }
 
-// Adds the products of the rows of `space` to the lower triangle of `gram`.
-void accumulate(const RowSpace& space, Range rows, Eigen::MatrixXd& gram) {
+// Signals of one space and their places in a Gram matrix, ascending.
+struct Placed {
   std::vector<const Eigen::VectorXd*> used;
   std::vector<Eigen::Index> index;
-  for (std::size_t c = 0; c < space.columns.size(); ++c) {
-    if (space.columns[c].size() > 0) {
-      used.push_back(&space.columns[c]);
-      index.push_back(static_cast<Eigen::Index>(c));
+
+  void add(const Eigen::VectorXd& signal, std::size_t place) {
+    if (signal.size() > 0) {
+      used.push_back(&signal);
+      index.push_back(static_cast<Eigen::Index>(place));
     }
   }
-  used.push_back(&space.response);
-  index.push_back(static_cast<Eigen::Index>(space.columns.size()));
+};
+
+// Adds the products of the rows of the signals, in units of `floor`, to the lower triangle of `gram`.
+void accumulate(const Placed& signals, double floor, Range rows, Eigen::MatrixXd& gram) {
+  const auto& [used, index] = signals;
   const auto n = static_cast<Eigen::Index>(used.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(n, n);
   Eigen::MatrixXd chunk(kChunk, n);
   for (Eigen::Index k = rows.first; k < rows.last; k += kChunk) {
     const Eigen::Index m = std::min(kChunk, rows.last - k);
     for (Eigen::Index c = 0; c < n; ++c) {
-      chunk.col(c).head(m) = used[static_cast<std::size_t>(c)]->segment(k, m) / space.floor;
+      chunk.col(c).head(m) = used[static_cast<std::size_t>(c)]->segment(k, m) / floor;
     }
     sum.selfadjointView<Eigen::Lower>().rankUpdate(chunk.topRows(m).transpose());
   }
@@ -212,6 +215,15 @@ void accumulate(const RowSpace& space, Range rows, Eigen::MatrixXd& gram) {
       gram(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(j)]) += sum(i, j);
     }
   }
+}
+
+Placed columns_and_response(const RowSpace& space) {
+  Placed signals;
+  for (std::size_t c = 0; c < space.columns.size(); ++c) {
+    signals.add(space.columns[c], c);
+  }
+  signals.add(space.response, space.columns.size());
+  return signals;
 }
 
 }  // namespace
@@ -246,6 +258,7 @@ struct BlockGram::Problem {
   std::vector<double> all_A, all_b;  // all inner rows
   std::vector<double> A, b, e;       // of each block
   std::vector<double> x;             // [column][block]: fitted to the other blocks
+  Eigen::VectorXd taken;             // of each block: what the columns take of the efforts' noise; empty: nothing
 
   [[nodiscard]] static std::size_t pair(std::size_t i, std::size_t j) { return i * (i + 1) / 2 + j; }
   // Fits each block's complement by Cholesky, all blocks abreast.
@@ -357,6 +370,9 @@ Eigen::VectorXd BlockGram::Problem::losses() const {
       }
     }
   }
+  if (taken.size() > 0) {
+    loss += taken;
+  }
   return loss.cwiseMax(0.0);
 }
 
@@ -389,20 +405,24 @@ BlockGram::BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& op
   const std::size_t pairs = (columns_ + 1) * (columns_ + 2) / 2;
   gram_.assign(pairs * lanes(), 0.0);
   rows_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(blocks_));
+  std::vector<std::vector<Range>> cores(blocks_, std::vector<Range>(spaces.size()));
   core::for_all(blocks_, options.threads, [&](std::size_t b) {
     const auto size = static_cast<Eigen::Index>(columns_ + 1);
     Eigen::MatrixXd within = Eigen::MatrixXd::Zero(size, size), near = within;
     const auto border = [&](const RowSpace& space, std::size_t which) {
       return which == blocks_ ? space.t.size() : first_at(space.t, begin + static_cast<double>(which) * length);
     };
-    for (const RowSpace& space : spaces) {
+    for (std::size_t s = 0; s < spaces.size(); ++s) {
+      const RowSpace& space = spaces[s];
       const Range block{border(space, b), border(space, b + 1)};
-      Range core = rows_within(space, interiors_[b]);
+      Range& core = cores[b][s];
+      core = rows_within(space, interiors_[b]);
       core.first = std::min(core.first, block.last);
       core.last = std::max(core.first, std::min(core.last, block.last));
-      accumulate(space, core, within);
-      accumulate(space, {block.first, core.first}, near);
-      accumulate(space, {core.last, block.last}, near);
+      const Placed signals = columns_and_response(space);
+      accumulate(signals, space.floor, core, within);
+      accumulate(signals, space.floor, {block.first, core.first}, near);
+      accumulate(signals, space.floor, {core.last, block.last}, near);
       rows_[static_cast<Eigen::Index>(b)] += static_cast<double>(core.last - core.first);
     }
     std::size_t p = 0;
@@ -422,6 +442,94 @@ BlockGram::BlockGram(const std::vector<RowSpace>& spaces, const BlockOptions& op
       near += lane[blocks_ + b];
     }
     lane[all()] = lane[inner()] + near;
+  }
+  accumulate_noise(spaces, cores, options.threads);
+}
+
+void BlockGram::accumulate_noise(const std::vector<RowSpace>& spaces, const std::vector<std::vector<Range>>& cores,
+                                 std::size_t threads) {
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> index(columns_, kNone);
+  for (const RowSpace& space : spaces) {
+    for (std::size_t c = 0; c < space.noise_columns.size(); ++c) {
+      if (space.noise_columns[c].size() > 0 && index[c] == kNone) {
+        index[c] = noise_columns_++;
+      }
+    }
+  }
+  if (noise_columns_ == 0) {
+    return;
+  }
+  for (std::size_t& place : index) {
+    place = std::min(place, noise_columns_);
+  }
+  noise_index_ = std::move(index);
+  const std::size_t size = noise_columns_ + 1;
+  noise_gram_.assign(size * (size + 1) / 2 * blocks_, 0.0);
+  core::for_all(blocks_, threads, [&](std::size_t b) {
+    const auto n = static_cast<Eigen::Index>(size);
+    Eigen::MatrixXd within = Eigen::MatrixXd::Zero(n, n);
+    for (std::size_t s = 0; s < spaces.size(); ++s) {
+      Placed signals;
+      for (std::size_t c = 0; c < spaces[s].noise_columns.size(); ++c) {
+        signals.add(spaces[s].noise_columns[c], noise_index_[c]);
+      }
+      signals.add(spaces[s].noise, noise_columns_);
+      Eigen::MatrixXd own = Eigen::MatrixXd::Zero(n, n);
+      accumulate(signals, spaces[s].floor, cores[b][s], own);
+      within += own;
+    }
+    std::size_t p = 0;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j, ++p) {
+        noise_gram_[p * blocks_ + b] = within(i, j);
+      }
+    }
+  });
+}
+
+// Sets what the columns of a solved problem take of the efforts' noise ε, δ being that noise in them with their
+// coefficients: 2 ε·δ − δ·δ. Columns that add noise are left as they are.
+void BlockGram::set_taken(const Subset& subset, Problem& q) const {
+  if (noise_columns_ == 0) {
+    return;
+  }
+  struct Part {
+    std::size_t place;
+    const double* x;  // of each block; null: 1
+    double unit;
+    [[nodiscard]] double factor(std::size_t block) const { return x == nullptr ? 1.0 : unit * x[block]; }
+  };
+  std::vector<Part> parts;
+  for (const std::size_t f : subset.fixed) {
+    if (noise_index_[f] < noise_columns_) {
+      parts.push_back({noise_index_[f], nullptr, 1.0});
+    }
+  }
+  for (std::size_t i = 0; i < q.k; ++i) {
+    if (noise_index_[subset.columns[i]] < noise_columns_) {
+      parts.push_back({noise_index_[subset.columns[i]], &q.x[i * blocks_], q.unit[i]});
+    }
+  }
+  if (parts.empty()) {
+    return;
+  }
+  Eigen::VectorXd taken = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(blocks_));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const double* const along = noise_products(noise_columns_, parts[i].place);
+    for (std::size_t c = 0; c < blocks_; ++c) {
+      taken[static_cast<Eigen::Index>(c)] += 2.0 * parts[i].factor(c) * along[c];
+    }
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double* const both = noise_products(parts[i].place, parts[j].place);
+      const double twice = i == j ? 1.0 : 2.0;
+      for (std::size_t c = 0; c < blocks_; ++c) {
+        taken[static_cast<Eigen::Index>(c)] -= twice * parts[i].factor(c) * parts[j].factor(c) * both[c];
+      }
+    }
+  }
+  if (taken.sum() > 0.0) {
+    q.taken = std::move(taken);
   }
 }
 
@@ -498,6 +606,7 @@ BlockGram::Problem BlockGram::held_out(const Subset& subset) const {
   Problem problem = gather(subset);
   problem.solve_without_signs();
   problem.mend_signs(subset.sign);
+  set_taken(subset, problem);
   return problem;
 }
 
@@ -518,13 +627,32 @@ namespace {
 
 constexpr double kMostPieces = 9.0e15;  // of one block: their numbers are exact in a double
 
+// What the noise of the efforts is in the columns of the subset together; empty: nothing.
+Eigen::VectorXd noise_in_columns(const RowSpace& space, const Subset& subset, const Eigen::VectorXd& coefficients,
+                                 Range rows) {
+  Eigen::VectorXd sum;
+  const auto add = [&](std::size_t c, double factor) {
+    if (c < space.noise_columns.size() && space.noise_columns[c].size() > 0) {
+      const Eigen::VectorXd part = factor * space.noise_columns[c].segment(rows.first, rows.last - rows.first);
+      sum = sum.size() > 0 ? Eigen::VectorXd(sum + part) : part;
+    }
+  };
+  for (const std::size_t c : subset.fixed) {
+    add(c, 1.0);
+  }
+  for (std::size_t k = 0; k < subset.columns.size(); ++k) {
+    add(subset.columns[k], coefficients[static_cast<Eigen::Index>(k)]);
+  }
+  return space.noise.size() > 0 ? sum : Eigen::VectorXd();
+}
+
 }  // namespace
 
 Eigen::VectorXd held_out_pieces(const BlockGram& gram, const std::vector<RowSpace>& spaces, const Subset& subset,
                                 double length) {
   check::positive(length, "held_out_pieces length");
   const Eigen::MatrixXd coefficients = gram.held_out_coefficients(subset);
-  std::vector<double> losses;
+  std::vector<double> losses, taken_of;
   for (std::size_t block = 0; block < gram.blocks(); ++block) {
     if (!(gram.rows()[static_cast<Eigen::Index>(block)] > 0.0)) {
       continue;
@@ -537,25 +665,31 @@ Eigen::VectorXd held_out_pieces(const BlockGram& gram, const std::vector<RowSpac
       ranges.push_back(rows_within(space, gram.interiors()[block]));
       rows_inside += ranges.back().last - ranges.back().first;
     }
-    std::map<std::int64_t, double> sums;
+    std::map<std::int64_t, std::pair<double, double>> sums;  // losses, and what is taken of the noise
     for (std::int64_t piece = 0; pieces <= rows_inside && piece < pieces; ++piece) {
-      sums[piece] = 0.0;
+      sums[piece] = {0.0, 0.0};
     }
     for (std::size_t s = 0; s < spaces.size(); ++s) {
       const RowSpace& space = spaces[s];
       const Range rows = ranges[s];
-      const Eigen::VectorXd left = residual(space, subset, coefficients.col(static_cast<Eigen::Index>(block)),
-                                            rows.first, rows.last - rows.first);
+      const Eigen::VectorXd block_coefficients = coefficients.col(static_cast<Eigen::Index>(block));
+      const Eigen::VectorXd left = residual(space, subset, block_coefficients, rows.first, rows.last - rows.first);
+      const Eigen::VectorXd noise = noise_in_columns(space, subset, block_coefficients, rows);
       for (Eigen::Index k = 0; k < left.size(); ++k) {
         const double place = (space.t[rows.first + k] - from) / (to - from) * static_cast<double>(pieces);
-        sums[std::min(static_cast<std::int64_t>(place), pieces - 1)] += std::pow(left[k] / space.floor, 2);
+        const double taken = noise.size() > 0 ? noise[k] * (2.0 * space.noise[rows.first + k] - noise[k]) : 0.0;
+        auto& [loss, taken_sum] = sums[std::min(static_cast<std::int64_t>(place), pieces - 1)];
+        loss += std::pow(left[k] / space.floor, 2);
+        taken_sum += taken / (space.floor * space.floor);
       }
     }
     for (const auto& [piece, sum] : sums) {
-      losses.push_back(sum);
+      losses.push_back(sum.first);
+      taken_of.push_back(sum.second);
     }
   }
-  return Eigen::Map<const Eigen::VectorXd>(losses.data(), static_cast<Eigen::Index>(losses.size()));
+  const Eigen::Map<const Eigen::VectorXd> loss(losses.data(), std::ssize(losses)), taken(taken_of.data(), loss.size());
+  return taken.sum() > 0.0 ? Eigen::VectorXd(loss + taken) : Eigen::VectorXd(loss);
 }
 
 double BlockGram::held_out_error(const Subset& subset) const { return held_out_loss(subset).sum() / rows_.sum(); }

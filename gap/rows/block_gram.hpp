@@ -35,6 +35,10 @@ struct RowSpace {
   Eigen::VectorXd response;              ///< what is to be explained
   std::vector<Eigen::VectorXd> columns;  ///< the same columns in every space; an empty one stands for zeros
   double floor = 1.0;                    ///< standard deviation of the noise: all is divided by it
+  Eigen::VectorXd noise{};  ///< noise as large as that of the efforts, as the response would have it; empty:
+                            ///< none is known
+  std::vector<Eigen::VectorXd> noise_columns{};  ///< what it would be in each column, for those that are made of
+                                                 ///< measured efforts; missing or empty ones stand for zeros
 };
 
 /// Division of rows into blocks.
@@ -82,9 +86,19 @@ struct BlockFit {
 /// mean's t would be blind to it.
 [[nodiscard]] double signed_rank(const Eigen::VectorXd& differences);
 
+/// Half-open rows of one space.
+struct SpaceRange {
+  Eigen::Index first = 0;
+  Eigen::Index last = 0;
+};
+
 /// Gram matrices of columns and response over the inner rows of each block, and over the rows near borders.
 ///
 /// Everything is in units of the floors: a residual that is nothing but noise has the mean square 1.
+///
+/// A column that is made of the measured efforts has their noise ε (RowSpace::noise) as δ in it (noise_columns), and a
+/// fit with such columns takes ε − δ for what noise leaves. Held-out losses have |ε|² − |ε − δ|² added, where that is
+/// > 0 in all: they are what the same coefficients would leave of efforts without noise, and the noise.
 class BlockGram {
  public:
   /// One pass over the rows. Throws InvalidArgument when sizes disagree, times descend, a floor is not > 0, a value is
@@ -134,6 +148,13 @@ class BlockGram {
   [[nodiscard]] std::size_t inner() const { return 2 * blocks_; }
   [[nodiscard]] std::size_t all() const { return 2 * blocks_ + 1; }
 
+  void accumulate_noise(const std::vector<RowSpace>& spaces, const std::vector<std::vector<SpaceRange>>& cores,
+                        std::size_t threads);
+  // Products over the inner rows of each block of two columns' noise, by noise_index_.
+  [[nodiscard]] const double* noise_products(std::size_t i, std::size_t j) const {
+    return noise_gram_.data() + (i >= j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i) * blocks_;
+  }
+  void set_taken(const Subset& subset, Problem& problem) const;
   void check_subset(const Subset& subset) const;
   [[nodiscard]] Problem gather(const Subset& subset) const;
   [[nodiscard]] Problem held_out(const Subset& subset) const;
@@ -141,6 +162,9 @@ class BlockGram {
   std::size_t columns_ = 0;
   std::size_t blocks_ = 0;
   std::vector<double> gram_;
+  std::vector<std::size_t> noise_index_;  // of each column in noise_gram_; its size there: none. Empty: no noise
+  std::size_t noise_columns_ = 0;         // in noise_gram_; the noise of the response has this index
+  std::vector<double> noise_gram_;
   Eigen::VectorXd rows_;
   std::vector<std::pair<double, double>> interiors_;
   double all_rows_ = 0.0;

@@ -294,20 +294,20 @@ Eigen::VectorXd combined(const Eigen::MatrixXd& matrix, Eigen::Index row, const 
   return sum;
 }
 
-void smooth_joint(const Drive& drive, JointSignals& joint) {
-  const Eigen::Index n = joint.speed.size();
-  joint.smooth_speed.resize(n);
-  joint.smooth_acceleration.resize(n);
-  joint.smooth_effort.resize(n);
-  Eigen::VectorXd unused(n);
+void smooth_signal(const Drive& drive, const Eigen::VectorXd& signal, Eigen::VectorXd& value, Eigen::VectorXd& slope) {
+  value.resize(signal.size());
+  slope.resize(signal.size());
   for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
     const auto [first, last] = drive.segment(s);
-    smooth_quadratic(view(std::as_const(joint.speed), first, last), drive.window, view(joint.smooth_speed, first, last),
-                     view(joint.smooth_acceleration, first, last));
-    smooth_quadratic(view(std::as_const(joint.effort), first, last), drive.window,
-                     view(joint.smooth_effort, first, last), view(unused, first, last));
+    smooth_quadratic(view(signal, first, last), drive.window, view(value, first, last), view(slope, first, last));
   }
+}
+
+void smooth_joint(const Drive& drive, JointSignals& joint) {
+  smooth_signal(drive, joint.speed, joint.smooth_speed, joint.smooth_acceleration);
   joint.smooth_acceleration /= drive.step;
+  Eigen::VectorXd unused;
+  smooth_signal(drive, joint.effort, joint.smooth_effort, unused);
 }
 
 void append_segment(Drive& drive, Series t, Columns columns, const Measurement& measurement) {
@@ -502,6 +502,29 @@ Drive make_drive(const LogTable& log, const Robot& robot, const Measurement& mea
                                  combined(motion, c, drive.joints, &JointSignals::smooth_acceleration)});
   }
   return drive;
+}
+
+Drive with_effort_noise(const Drive& drive) {
+  Drive noisy = drive;
+  for (JointSignals& joint : noisy.joints) {
+    if (joint.effort_noise.size() == 0) {
+      continue;
+    }
+    Eigen::VectorXd at_instants = joint.effort_noise;
+    if (joint.held_effort.size() > 0) {
+      joint.held_effort += joint.effort_noise;
+      for (std::size_t s = 0; s < drive.segment_starts.size(); ++s) {
+        const auto [first, last] = drive.segment(s);
+        const Eigen::Index n = last - first;
+        at_instants.segment(first + 1, n - 1) =
+            0.5 * (joint.effort_noise.segment(first, n - 1) + joint.effort_noise.segment(first + 1, n - 1));
+      }
+    }
+    joint.effort += at_instants;
+    Eigen::VectorXd unused;
+    smooth_signal(noisy, joint.effort, joint.smooth_effort, unused);
+  }
+  return noisy;
 }
 
 void predict_efforts(Drive& drive, const Eigen::VectorXd& theta) {

@@ -33,6 +33,7 @@ struct JointSignals {
   Eigen::VectorXd effort;               ///< at the instants; a held command: mean of what was held before and after
   Eigen::VectorXd held_effort;          ///< held from its instant to the next one; empty where efforts are not held
   Eigen::VectorXd smooth_effort;        ///< smoothed `effort`
+  Eigen::VectorXd effort_noise;         ///< noise as large as the measured effort's, draw_effort_noise(); empty: none
   Eigen::VectorXd predicted_effort;     ///< of the base model on the smooth motion; empty before predict_efforts()
   Eigen::VectorXd expected_effort;      ///< predicted_effort, or with what causes add to it (expect_efforts)
   Mask resting;                         ///< stands still
@@ -107,6 +108,10 @@ struct DriveOptions {
 /// Throws InvalidArgument when `log` lacks a column of `measurement` or has no segment of three samples.
 [[nodiscard]] Drive make_drive(const LogTable& log, const Robot& robot, const Measurement& measurement,
                                const DriveOptions& options = {});
+
+/// The drive whose measured efforts have their JointSignals::effort_noise once more: what differs in anything made of
+/// both is what noise does to it.
+[[nodiscard]] Drive with_effort_noise(const Drive& drive);
 
 /// Sets `theta` and the joints' predicted efforts: Y(v, v̇) θ of the smooth motion (20), mapped back to the joints by
 /// the inverse of Model::input. Throws InvalidArgument unless θ has p entries and the input matrix is square and

@@ -248,6 +248,40 @@ void subtract(GapRows& rows, const std::vector<Eigen::VectorXd>& part) {
   }
 }
 
+bool has_effort_noise(const Drive& drive) {
+  return std::ranges::any_of(drive.joints, [](const JointSignals& joint) { return joint.effort_noise.size() > 0; });
+}
+
+// `noisy` − `part`; empty where nothing differs.
+Eigen::VectorXd difference(const Eigen::VectorXd& noisy, const Eigen::VectorXd& part) {
+  return noisy.size() == 0 || part.size() == 0 || noisy == part ? Eigen::VectorXd() : Eigen::VectorXd(noisy - part);
+}
+
+bool same_efforts(const std::vector<Column>& a, const std::vector<Column>& b) {
+  return std::ranges::equal(a, b, [](const Column& one, const Column& other) {
+    return one.effort == other.effort && one.effort_rate == other.effort_rate;
+  });
+}
+
+// What the noise of the efforts is in the responses of the rows of `drive`, which have `healthy` taken off.
+void add_noise(GapRows& rows, const Drive& drive, const std::vector<Eigen::VectorXd>& outputs,
+               const std::vector<FittedEffect>& healthy, const GapRowOptions& options) {
+  const Drive noisy = with_effort_noise(drive);
+  const std::vector<Eigen::VectorXd> noisy_outputs = filtered_outputs(noisy, options.beta);
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    rows.spaces[i].noise = picked(noisy_outputs[i] - outputs[i], rows.instants);
+  }
+  for (const FittedEffect& effect : healthy) {
+    const std::vector<Eigen::VectorXd> part = rows_of(drive, rows, effect, options),
+                                       noisy_part = rows_of(noisy, rows, effect, options);
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      if (const Eigen::VectorXd own = difference(noisy_part[i], part[i]); own.size() > 0) {
+        rows.spaces[i].noise -= own;
+      }
+    }
+  }
+}
+
 // `centre`, with each continuous coordinate moved towards its neighbours on `grid` in `points` steps each way, one
 // coordinate at a time.
 std::vector<std::vector<double>> shapes_about(const Effect& effect, const std::vector<std::vector<double>>& grid,
@@ -361,6 +395,9 @@ GapRows make_gap_rows(const Drive& drive, const NoiseFloor& floor, const std::ve
   for (const FittedEffect& effect : healthy) {
     subtract(rows, rows_of(drive, rows, effect, options));
   }
+  if (has_effort_noise(drive)) {
+    add_noise(rows, drive, y, healthy, options);
+  }
   return rows;
 }
 
@@ -464,17 +501,42 @@ CandidateTable add_catalogue(GapRows& rows, const Drive& drive, const std::vecto
     std::size_t effect;
     std::vector<double> shape;
     std::vector<std::vector<Eigen::VectorXd>> parts;  // [column][space]
+    std::vector<std::vector<Eigen::VectorXd>> noise;  // likewise; empty: none of its columns has noise
   };
   std::vector<Task> tasks;
   for (std::size_t e = 0; e < catalogue.size(); ++e) {
     table.names.push_back(catalogue[e].name);
     for (const std::vector<double>& shape : shapes[e]) {
-      tasks.push_back({e, shape, {}});
+      tasks.push_back({e, shape, {}, {}});
     }
   }
+  const Drive noisy = has_effort_noise(drive) ? with_effort_noise(drive) : Drive();
+  std::vector<bool> noise(catalogue.size(), false);  // in some column of the effect
+  for (std::size_t e = 0; e < catalogue.size() && noisy.rows() > 0; ++e) {
+    const auto differs = [&](const std::vector<double>& shape) {
+      return !same_efforts(catalogue[e].columns(drive, shape), catalogue[e].columns(noisy, shape));
+    };
+    // A limit takes something of the efforts at some of its shapes only.
+    noise[e] = catalogue[e].unit_coefficient ? std::ranges::any_of(shapes[e], differs)
+                                             : !shapes[e].empty() && differs(shapes[e][shapes[e].size() / 2]);
+  }
   core::for_all(tasks.size(), options.threads, [&](std::size_t k) {
-    for (const Column& column : catalogue[tasks[k].effect].columns(drive, tasks[k].shape)) {
-      tasks[k].parts.push_back(rows_of(drive, rows, column, options));
+    Task& task = tasks[k];
+    const Effect& effect = catalogue[task.effect];
+    const std::vector<Column> columns = effect.columns(drive, task.shape);
+    for (const Column& column : columns) {
+      task.parts.push_back(rows_of(drive, rows, column, options));
+    }
+    if (!noise[task.effect]) {
+      return;
+    }
+    const std::vector<Column> noisy_columns = effect.columns(noisy, task.shape);
+    task.noise.resize(columns.size(), std::vector<Eigen::VectorXd>(rows.spaces.size()));
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const std::vector<Eigen::VectorXd> noisy_parts = rows_of(noisy, rows, noisy_columns[c], options);
+      for (std::size_t i = 0; i < drive.model.n(); ++i) {
+        task.noise[c][i] = difference(noisy_parts[i], task.parts[c][i]);
+      }
     }
   });
   for (Task& task : tasks) {
@@ -486,6 +548,10 @@ CandidateTable add_catalogue(GapRows& rows, const Drive& drive, const std::vecto
     candidate.beside = static_cast<std::size_t>(std::ranges::count(effect.shapes, true, &ShapeParameter::beside));
     for (std::size_t c = 0; c < task.parts.size(); ++c) {
       candidate.columns.push_back(add_column(rows.spaces, std::move(task.parts[c])));
+      for (std::size_t i = 0; i < drive.model.n() && !task.noise.empty(); ++i) {
+        rows.spaces[i].noise_columns.resize(rows.spaces[i].columns.size());
+        rows.spaces[i].noise_columns.back() = std::move(task.noise[c][i]);
+      }
       candidate.sign.push_back(c < effect.parameters.size() ? effect.parameters[c].sign : 0);
       if (c >= effect.parameters.size() || !effect.parameters[c].beside) {
         candidate.own.push_back(candidate.columns.back());

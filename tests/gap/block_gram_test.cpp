@@ -230,6 +230,44 @@ TEST(BlockGram, ThreadsDoNotChangeABit) {
   EXPECT_EQ(one.held_out_error({{0, 3}}), three.held_out_error({{0, 3}}));
 }
 
+// Measured efforts are u + ε. A column of u + ε beside a response that is ε takes all of it, and has explained nothing:
+// another draw of ε says by how much. Oracle: the losses of the same coefficients without noise in the column.
+TEST(BlockGram, WhatAColumnTakesOfTheNoiseIsNoGain) {
+  std::mt19937_64 rng(11);
+  std::normal_distribution<double> normal;
+  constexpr Eigen::Index rows = 4000;
+  const auto draw = [&](double deviation) {
+    return Eigen::VectorXd(Eigen::VectorXd::NullaryExpr(rows, [&] { return deviation * normal(rng); }));
+  };
+  for (const double signal : {0.0, 0.5, 2.0}) {  // deviation of u; ε has 1
+    RowSpace space;
+    space.t = Eigen::VectorXd::LinSpaced(rows, 0.0, kDuration);
+    const Eigen::VectorXd u = draw(signal), noise = draw(1.0);
+    space.response = noise;
+    space.columns = {u + noise, u};
+    space.noise = draw(1.0);
+    space.noise_columns = {space.noise};
+    const BlockGram gram({space}, options());
+    const double coefficient = 1.0 / (1.0 + signal * signal);  // that least squares give the first column
+    EXPECT_NEAR(gram.fit({{0}}).mean_square, 1.0 - coefficient, 0.06) << signal;
+    EXPECT_NEAR(gram.held_out_error({{0}}), 1.0 + std::pow(coefficient * signal, 2), 0.08) << signal;
+    EXPECT_NEAR(gram.held_out_error({{}, {0}}), 1.0 + signal * signal, 0.08 * (1.0 + signal * signal)) << signal;
+    EXPECT_NEAR(gram.held_out_loss({{0}}).sum(), held_out_pieces(gram, {space}, {{0}}, 0.7).sum(),
+                1e-9 * static_cast<double>(rows));
+    // What has no noise of its own is what it was.
+    RowSpace bare = space;
+    bare.noise.resize(0);
+    bare.noise_columns.clear();
+    const BlockGram plain({bare}, options());
+    EXPECT_EQ(gram.held_out_error({{1}}), plain.held_out_error({{1}}));
+    EXPECT_EQ(gram.fit({{0}}).coefficients, plain.fit({{0}}).coefficients);
+    EXPECT_LT(plain.held_out_error({{0}}), 1.0 - 0.8 * coefficient);
+    // A column that only adds noise gains nothing by it.
+    space.noise_columns = {-3.0 * space.noise};
+    EXPECT_EQ(BlockGram({space}, options()).held_out_error({{0}}), plain.held_out_error({{0}}));
+  }
+}
+
 TEST(BlockGram, ShortLogsHaveFewerBlocks) {
   const std::vector<RowSpace> spaces = random_spaces(7);  // of 40 s
   EXPECT_EQ(BlockGram(spaces, {.blocks = 16}).blocks(), 16U);

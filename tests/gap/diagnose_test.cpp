@@ -113,6 +113,50 @@ TEST(Diagnose, SaysThatAModelDoesNotFitTheHealthyRobot) {
   EXPECT_FALSE(noisy.misfit);
 }
 
+// Columns that are made of the measured efforts have their noise in them: it is taken out of a residual by them, and
+// that is no cause.
+TEST(Diagnose, NoiseOfTheEffortsIsNoCause) {
+  for (const double rate : {25.0, 50.0}) {
+    for (const unsigned seed : {311U, 312U, 313U, 314U, 315U}) {
+      Scenario log = noisy_scenario(counted_robot(), seed, rate);
+      log.sensors.effort = 0.35 + 0.05 * static_cast<double>(seed % 5);
+      Scenario before = healthy_scenario(log);
+      before.sensors = log.sensors;
+      Simulation real(log), healthy(before);
+      const Diagnosis found = diagnose(real, &healthy, counted_robot(), quick());
+      EXPECT_EQ(found.verdict, GapVerdict::no_gap) << rate << " Hz, seed " << seed;
+    }
+  }
+}
+
+// A healthy log on which an asymmetry is too small to be a cause tells it for one on which it is not.
+TEST(Diagnose, WhatARobotHasAsItIsBuiltIsKnown) {
+  Scenario log = noisy_scenario(robot_with("com_lateral", {{"b", 0.006}}), 41);
+  log.sensors.effort = 0.2;
+  Scenario before = log;
+  before.seed += 5000;
+  before.trajectory.speed = 0.55;
+  before.trajectory.yaw_rate = 1.1;
+  const auto diagnosis = [&](const Scenario& real, bool as_built) {
+    DiagnoseOptions options = quick();
+    options.catalogue = effect_catalogue();
+    for (Effect& effect : *options.catalogue) {
+      effect.as_built = effect.as_built && as_built;
+    }
+    Simulation now(real), healthy(before);
+    return diagnose(now, &healthy, counted_robot(), options);
+  };
+  EXPECT_EQ(diagnosis(log, true).verdict, GapVerdict::no_gap);
+  EXPECT_NE(diagnosis(log, false).verdict, GapVerdict::no_gap);
+  Scenario more = log;
+  more.robot = robot_with("com_lateral", {{"b", 0.026}});
+  const Diagnosis found = diagnosis(more, true);
+  ASSERT_EQ(found.causes.size(), 1U);
+  EXPECT_EQ(found.causes.front().effect, "com_lateral");
+  EXPECT_LE(found.causes.front().parameters.front().lower, 0.02);
+  EXPECT_GE(found.causes.front().parameters.front().upper, 0.02);
+}
+
 // It was counted on logs with a healthy one beside them and the catalogue whole, and says nothing of others.
 TEST(Diagnose, HasARecordWhereOneWasCounted) {
   const Scenario scenario = noisy_scenario(robot_with("coulomb", {{"c", 0.3}}), 2);

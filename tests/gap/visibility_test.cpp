@@ -3,6 +3,7 @@
 #include "gap/causes/visibility.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -57,14 +58,17 @@ Diagnosis diagnosis_of(const Scenario& scenario) {
   return diagnose(log, &healthy, counted_robot(), options);
 }
 
-// Sizes that were promised on a log without a gap, and the log; another draw of noise for every effect.
+// Sizes that were promised on a log without a gap, and the log; another rate and another noise for every effect, from
+// next to none to half of the efforts.
 class VisibleSizes : public testing::TestWithParam<Case> {};
 
 TEST_P(VisibleSizes, AreSeenAtTwiceTheSizeAndNotAtThreeTenthsOfIt) {
   const Case& c = GetParam();
   std::mt19937_64 generator(std::hash<std::string>()(c.effect + c.parameter) ^ 59U);
-  Scenario log = noisy_scenario(counted_robot(), static_cast<unsigned>(generator()));
-  log.sensors.effort = std::uniform_real_distribution<double>(0.12, 0.18)(generator);
+  constexpr std::array kRates{25.0, 50.0, 100.0};
+  const double rate = kRates[std::uniform_int_distribution<std::size_t>(0, 2)(generator)];
+  Scenario log = noisy_scenario(counted_robot(), static_cast<unsigned>(generator()), rate);
+  log.sensors.effort = std::uniform_real_distribution<double>(0.05, 0.6)(generator);
   const Diagnosis nothing = diagnosis_of(log);
   ASSERT_EQ(nothing.verdict, GapVerdict::no_gap);
   const auto promised = std::ranges::find_if(
@@ -77,8 +81,8 @@ TEST_P(VisibleSizes, AreSeenAtTwiceTheSizeAndNotAtThreeTenthsOfIt) {
     c.inject(with, factor * promised->size);
     const Diagnosis found = diagnosis_of(with);
     EXPECT_EQ(found.verdict == GapVerdict::no_gap, factor < 1.0)
-        << factor << " times " << promised->size << ' ' << promised->unit << ": " << to_string(found.verdict) << ", "
-        << core::listed(found.notes, "; ");
+        << rate << " Hz, noise " << log.sensors.effort << ", " << factor << " times " << promised->size << ' '
+        << promised->unit << ": " << to_string(found.verdict) << ", " << core::listed(found.notes, "; ");
     EXPECT_EQ(found.visible.empty(), found.verdict != GapVerdict::no_gap);
   }
 }
