@@ -40,7 +40,7 @@ struct EffortTiming {
   double moved = 0.0;  ///< largest change of a parameter from the one to the other, in its standard errors
   Interval open{};     ///< s, the shifts that the log does not exclude at a risk of kRiskOfDoubt
   /// By how much the estimate (p) changes from the nearest shift that is allowed to either end of `open`; empty for an
-  /// end that is allowed.
+  /// end that is allowed to kLeastShift of a step.
   std::array<Eigen::VectorXd, 2> open_change{};
 
   /// s, how far the shift lies outside of what is allowed; 0 inside.

@@ -138,7 +138,7 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
       const double shift = end == 0 ? timing.open.lower : timing.open.upper;
       const double nearest = std::clamp(shift, timing.allowed.lower, timing.allowed.upper);
       const auto taken = at_shift(model, nearest, fit.weights), shifted = at_shift(model, shift, fit.weights);
-      if (shift != nearest && taken && shifted) {
+      if (std::abs(shift - nearest) > kLeastShift * s.survey.median_step && taken && shifted) {
         timing.open_change[end] = shifted->theta - taken->theta;
       }
     }
