@@ -532,8 +532,8 @@ void check_density(const HealthView& view, const commission::Setting& s, const c
        .unit = "kg/m³"});
 }
 
-// Turning against the efforts. Friction of turning comes out negative on sound logs that hardly turn, too: it is a cause
-// only of a log that no parameters explain.
+// Turning against the efforts. Friction of turning comes out negative on sound logs that hardly turn, too: it is a
+// cause only of a log that no parameters explain.
 void check_sides(const commission::Setting& s, const commission::Fit& fit, std::vector<LogFinding>& out) {
   const bool unexplained = s.noise_complete && std::ranges::find(out, "motion.refused", &LogFinding::id) != out.end();
   const auto of_yaw = [&](std::size_t j) {

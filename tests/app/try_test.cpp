@@ -186,7 +186,8 @@ TEST_F(Try, CommandsStopAtUnitsAndSignsThatCannotBe) {
   }
   put("sound.csv", csv(rows, 1.0, 1.0));
   EXPECT_EQ(run("commission sound.csv --robot robot.yaml --quiet").code, 0);
-  const std::string told = run("try sound.csv --robot robot.yaml").out;  // of a robot file that is there none is written
+  // Where a robot file is given none is written.
+  const std::string told = run("try sound.csv --robot robot.yaml").out;
   EXPECT_THAT(told, AllOf(HasSubstr("wrote wheelwright_try/report.html"), ::testing::Not(HasSubstr("try/robot.yaml"))));
   EXPECT_FALSE(std::filesystem::exists(path("wheelwright_try/robot.yaml")));
   EXPECT_EQ(
