@@ -82,6 +82,7 @@ int made(const fs::path& path, Temporary::Kind kind) {
     descriptor = open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   } else if (mkdir(path.c_str(), kind == Temporary::Kind::private_directory ? 0700 : 0777) == 0) {
     descriptor = opened(path, true);
+    errno = descriptor < 0 && errno == ENOENT ? EEXIST : errno;  // somebody took it for a dead one before it had a lock
   }
   if (descriptor < 0) {
     return -1;

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -98,6 +99,32 @@ TEST_F(Temporaries, ADirectoryOfAKilledProgramIsRemovedByTheNext) {
   const std::unique_ptr<Temporary> next(make());
   EXPECT_EQ(next->path(), path("copy-0"));
   EXPECT_TRUE(fs::is_empty(path("copy-0")));
+}
+
+// A directory that was made and has no lock yet looks dead to whoever comes between.
+TEST_F(Temporaries, OfProgramsThatMakeThemAtOnceNoneFails) {
+  constexpr int kPrograms = 6, kTimes = 1500;
+  std::vector<pid_t> children;
+  for (int program = 0; program < kPrograms; ++program) {
+    children.push_back(fork());
+    if (children.back() == 0) {
+      bool fails = false;
+      for (int k = 0; k < kTimes && !fails; ++k) {
+        try {
+          const Temporary mine(path("copy-"), Temporary::Kind::private_directory, "it", "room");
+          fails = !fs::is_directory(mine.path());
+        } catch (const Error&) {
+          fails = true;
+        }
+      }
+      _exit(fails ? 1 : 0);
+    }
+  }
+  for (const pid_t child : children) {
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_EQ(status, 0);
+  }
 }
 
 TEST_F(Temporaries, OfWritersThatLiveEachKeepsItsOwn) {
