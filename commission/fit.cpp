@@ -132,21 +132,9 @@ identify::RegressionMoments log_moments(LogSource& log, const Setting& s, Part p
   return identify::moments(rows);
 }
 
-namespace {
-
-// Whether rows are lost more often than twice a second: between most losses no row of the filter is settled.
-bool loses_often(const Survey& survey) {
-  constexpr double kOften = 2.0;  // 1/s
-  const double lost = survey.seconds / survey.median_step - static_cast<double>(survey.rows);
-  return lost > kOften * survey.seconds;
-}
-
-}  // namespace
-
 filter::SignalErrors errors_of_fit(const Setting& s) {
   filter::SignalErrors errors = s.declared;
   errors.between_samples = errors.bridges = false;
-  errors.interpolates = s.noise_complete && loses_often(s.survey);  // noise that is learnt is that of bridged rows
   return errors;
 }
 

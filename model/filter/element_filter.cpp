@@ -12,8 +12,7 @@
 namespace wheelwright::filter {
 namespace {
 
-constexpr double kInterpolated = 6.5;  // nominal steps: five rows are lost
-constexpr double kAlike = 0.05;        // relative: steps alike enough for a parabola through past efforts
+constexpr double kAlike = 0.05;  // relative: steps alike enough for a parabola through past efforts
 
 // result = |matrix| · x.
 void multiply_sizes(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
@@ -63,9 +62,6 @@ ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors 
     back += steps_within(-measurement_.delay.lower, measurement_.nominal_step);
   }
   longest_ = measurement_.longest_step();
-  if (errors_.interpolates && measurement_.motion != MotionKind::mean_speed) {
-    longest_ = std::max(longest_, kInterpolated * measurement_.nominal_step);
-  }
   if (errors_.acceleration.size() == 0) {
     errors_.acceleration = errors_.speed = errors_.speed_sample = Eigen::VectorXd::Zero(coordinates);
   }
@@ -276,11 +272,9 @@ bool ElementFilter::measure_effort(std::size_t age) {
     }
     each(joints, [&](Eigen::Index j) { falling_in_[j] = 0.25 * (low_[j] + high_[j]); });
   } else if (!mean && held) {
-    const bool lost = errors_.interpolates && present().length > measurement_.longest_step();
     each(joints, [&](Eigen::Index j) {
-      const double held_there = lost ? 0.5 * (now.over[j] + now.effort[j]) : now.over[j];
-      low_[j] = high_[j] = held_there;
-      falling_in_[j] = 0.5 * held_there;
+      low_[j] = high_[j] = now.over[j];
+      falling_in_[j] = 0.5 * now.over[j];
     });
   } else if (!mean || held) {  // of means, the stamp is in the middle of the step
     const Eigen::VectorXd& begin = mean ? now.over : before.effort;
@@ -506,8 +500,7 @@ ElementFilter::EffortWeights ElementFilter::effort_weights() const {
   const bool held = measurement_.hold == Hold::zero_order;
   const bool mean = measurement_.motion == MotionKind::mean_speed;
   const bool between = measurement_.changes == model::EffortChanges::between;
-  if (ranged_ || errors_.interpolates || sharpening_.upper > 0.0 || !corrector_.empty() ||
-      measurement_.effort_unsigned || (held && between)) {
+  if (ranged_ || sharpening_.upper > 0.0 || !corrector_.empty() || measurement_.effort_unsigned || (held && between)) {
     return {};
   }
   const double a = element_.before, b = element_.step;
