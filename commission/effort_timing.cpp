@@ -137,8 +137,11 @@ std::optional<EffortTiming> effort_timing(LogSource& log, const Setting& s, cons
     for (std::size_t end = 0; end < 2; ++end) {
       const double shift = end == 0 ? timing.open.lower : timing.open.upper;
       const double nearest = std::clamp(shift, timing.allowed.lower, timing.allowed.upper);
+      if (std::abs(shift - nearest) <= kLeastShift * s.survey.median_step) {
+        continue;
+      }
       const auto taken = at_shift(model, nearest, fit.weights), shifted = at_shift(model, shift, fit.weights);
-      if (std::abs(shift - nearest) > kLeastShift * s.survey.median_step && taken && shifted) {
+      if (taken && shifted) {
         timing.open_change[end] = shifted->theta - taken->theta;
       }
     }

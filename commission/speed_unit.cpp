@@ -56,21 +56,24 @@ std::optional<model::SpeedCut> open_cut(LogSource& log, const model::Robot& robo
   if (robot.speed_cut || robot.noise.wheel_speed.value) {
     return std::nullopt;
   }
-  double unit = 0.0;
-  for (const std::string& name : columns) {
-    const std::size_t column = *log.find(name);
-    std::vector<double> speeds, sizes;
-    log.rewind();
-    for (LogBlock block; speeds.size() < kRows && log.next(block);) {
-      std::ranges::copy(block.columns[column], std::back_inserter(speeds));
+  const std::vector<std::size_t> at = core::positions_of(log, columns);
+  std::vector<std::vector<double>> of_columns(at.size());
+  log.rewind();
+  for (LogBlock block; of_columns.front().size() < kRows && log.next(block);) {
+    for (std::size_t c = 0; c < at.size(); ++c) {
+      std::ranges::copy(block.columns[at[c]], std::back_inserter(of_columns[c]));
     }
+  }
+  log.rewind();
+  double unit = 0.0;
+  for (const std::vector<double>& speeds : of_columns) {
+    std::vector<double> sizes;
     std::ranges::transform(speeds, std::back_inserter(sizes), [](double speed) { return std::abs(speed); });
     const auto rank = static_cast<std::size_t>(kTop * static_cast<double>(sizes.size()));
     const double top = sizes.empty() ? 0.0 : core::order_statistic(std::move(sizes), rank);
     const double found = top > 0.0 ? unit_of_speeds(speeds, top) : 0.0;
     unit = found > kCoarseUnit * top ? std::max(unit, found) : unit;
   }
-  log.rewind();
   return unit > 0.0 ? std::optional(model::SpeedCut{.unit = unit}) : std::nullopt;
 }
 

@@ -154,8 +154,7 @@ def main():
         factors = KINDS[name].robot
         drives[name] = world.simulate([dataclasses.replace(r, **{k: getattr(r, k) * v for k, v in factors.items()})
                                        for r in robots]) if factors else drives[""]
-    for robot in robots:
-        robot.fine = int(np.ceil(1.0 / robot.rate / 0.002)) * 2
+    world.refine(robots)
     print("| kind | lost | robots | alarmed | incidents | 95 % | excluded | first | wrong wheel | left | other |")
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     bad = 0

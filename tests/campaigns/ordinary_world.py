@@ -103,11 +103,16 @@ def draw_robot(g, rates, seconds, drive="", hold="", dry=None, memory=(1.0, 8.0)
     return out
 
 
+def refine(robots):
+    """Sets `fine` of each: integration steps to a sample, even, of 2 ms at most."""
+    for robot in robots:
+        robot.fine = int(np.ceil(1.0 / robot.rate / 0.002)) * 2
+
+
 def simulate(robots):
     """Drives `robots` and sets `fine` of each. Returns for each a dict of arrays over integration steps: t, phi_r,
     phi_l (rad), omega_r, omega_l (rad/s), tau_r, tau_l (N m, acting from t on)."""
-    for robot in robots:
-        robot.fine = int(np.ceil(1.0 / robot.rate / 0.002)) * 2
+    refine(robots)
     of = {name: np.array([getattr(r, name) for r in robots]) for name in
           "mass inertia viscous viscous_yaw coulomb radius track rate seconds kp ki fine heavier worn worn_late".split()}
     many, h = len(robots), 1.0 / of["rate"] / of["fine"]

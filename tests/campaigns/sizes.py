@@ -188,8 +188,7 @@ def main():
             worn.append(dataclasses.replace(robot, course=1 + SIZES["wheel_radius_left"] * of(name, seed)(t)))
     healthy = world.simulate([dataclasses.replace(r) for r in robots])
     drives = world.simulate(worn) if worn else []
-    for robot in robots:
-        robot.fine = int(np.ceil(1.0 / robot.rate / 0.002)) * 2
+    world.refine(robots)
     print("| kind | course | lost | incidents | with it | means | outside | width | growing | outside | lost | known |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|")
     bad, everything = 0, Tally()

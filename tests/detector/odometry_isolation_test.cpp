@@ -15,6 +15,7 @@
 #include "detector/faults/odometry_isolation.hpp"
 #include "detector/online_model.hpp"
 #include "tests/detector/detectability.hpp"
+#include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::detector::odometry_isolation_test {
 namespace {
@@ -47,14 +48,9 @@ struct Posed : Commissioned {
 };
 
 Posed posed_robot(std::uint64_t seed, bool position) {
-  Posed robot{{random_robot(seed), {}}, position};
+  Posed robot{{testing_support::with_pose(random_robot(seed)), {}}, position};
   Scenario& s = robot.scenario;
   s.duration = 24.0;
-  s.sensors.pose = true;
-  s.sensors.position = 0.002;
-  s.sensors.heading = 0.003;
-  s.robot.noise.position.value = 0.002;
-  s.robot.noise.heading.value = 0.003;
   Simulation source(s);
   const LogTable table = robot.seen(read_all(source));
   TableSource log(table);

@@ -17,6 +17,7 @@
 #include "detector/faults/size_over_time.hpp"
 #include "detector/online_model.hpp"
 #include "tests/detector/detectability.hpp"
+#include "tests/support/kinematic_drives.hpp"
 
 namespace wheelwright::detector::size_over_time_test {
 namespace {
@@ -36,14 +37,9 @@ struct Subject {
 };
 
 Subject subject_of(std::uint64_t seed) {
-  Subject out{random_robot(seed), {}};
+  Subject out{testing_support::with_pose(random_robot(seed)), {}};
   Scenario& s = out.drive;
   s.duration = 24.0;
-  s.sensors.pose = true;
-  s.sensors.position = 0.002;
-  s.sensors.heading = 0.003;
-  s.robot.noise.position.value = 0.002;
-  s.robot.noise.heading.value = 0.003;
   Simulation learning(s);
   const Commissioning result = commission_robot(learning, s.robot);
   if (result.status != Commissioning::Status::done || !result.model.kinematic) {
@@ -312,16 +308,11 @@ TEST_P(SizesOfRadii, HoldTheTrueMeansAndSizes) {
 INSTANTIATE_TEST_SUITE_P(Robots, SizesOfRadii, ::testing::Values(1, 2, 3));
 
 TEST(SizeOverTime, TellsTheSizeOfASmoothFaultByTorqueAlone) {
-  Scenario s = testing_support::noisy_drive(5, 20.0);
+  Scenario s = testing_support::posed_drive(5, 20.0);
   s.robot.encoder_counts_per_turn = 32768.0;
   s.sensors.encoder_counts_per_turn = 65536.0;
   s.robot.noise.effort.value = 0.005;
   s.sensors.effort = 0.0025;
-  s.sensors.pose = true;
-  s.sensors.position = 0.002;
-  s.sensors.heading = 0.003;
-  s.robot.noise.position.value = 0.002;
-  s.robot.noise.heading.value = 0.003;
   Simulation learning(s);
   const Commissioning result = commission_robot(learning, s.robot);
   ASSERT_TRUE(result.model.kinematic) << result.kinematic.message;

@@ -9,15 +9,19 @@
 
 namespace wheelwright::testing_support {
 
-/// noisy_drive() with a pose whose noise the robot declares: 2 mm and 3 mrad.
-inline Scenario posed_drive(std::uint64_t seed, double duration = 20.0) {
-  Scenario s = noisy_drive(seed, duration);
+/// The scenario with a pose whose noise is declared: 2 mm, 3 mrad.
+inline Scenario with_pose(Scenario s) {
   s.sensors.pose = true;
   s.sensors.position = 0.002;
   s.sensors.heading = 0.003;
   s.robot.noise.position.value = 0.002;
   s.robot.noise.heading.value = 0.003;
   return s;
+}
+
+/// noisy_drive() with a pose whose noise the robot declares: 2 mm and 3 mrad.
+inline Scenario posed_drive(std::uint64_t seed, double duration = 20.0) {
+  return with_pose(noisy_drive(seed, duration));
 }
 
 /// The same robot on a straight line.
