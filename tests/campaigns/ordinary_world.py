@@ -111,7 +111,8 @@ def refine(robots):
 
 def simulate(robots):
     """Drives `robots` and sets `fine` of each. Returns for each a dict of arrays over integration steps: t, phi_r,
-    phi_l (rad), omega_r, omega_l (rad/s), tau_r, tau_l (N m, acting from t on)."""
+    phi_l (rad), omega_r, omega_l (rad/s), tau_r, tau_l (N m, acting from t on; of efforts that change all the time, the
+    mean of the integration steps before and after t)."""
     refine(robots)
     of = {name: np.array([getattr(r, name) for r in robots]) for name in
           "mass inertia viscous viscous_yaw coulomb radius track rate seconds kp ki fine heavier worn worn_late".split()}
@@ -184,6 +185,8 @@ def simulate(robots):
         new = np.array([v + half * w, v - half * w]) / radii
         angle = angle + h / 2 * (omega + new)
         omega = new
+    linear = np.array([r.hold == "linear" for r in robots])
+    record[1:, 4:6, linear] = 0.5 * (record[:-1, 4:6, linear] + record[1:, 4:6, linear])
     names = ("phi_r", "phi_l", "omega_r", "omega_l", "tau_r", "tau_l")
     return [{"t": np.arange(last[i]) * h[i], **{name: record[:last[i], j, i].copy() for j, name in enumerate(names)}}
             for i in range(many)]
