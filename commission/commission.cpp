@@ -47,7 +47,8 @@ std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const id
       noise[i].origin = core::NoiseOrigin::declared;
       noise[i].learning = noise[i].bound = s.declared.output[at];
     } else {
-      noise[i] = estimated_noise(fit.residuals.outputs[i], fit.residuals.instants, fit.plausible[at], options);
+      const identify::ResidualSummary& residuals = fit.watched ? *fit.watched : fit.residuals;
+      noise[i] = estimated_noise(residuals.outputs[i], residuals.instants, fit.plausible[at], options);
     }
   }
   return noise;
@@ -56,6 +57,7 @@ std::vector<OutputNoise> output_noise(const Setting& s, const Fit& fit, const id
 SignalErrors with_noise(const Setting& s, const std::vector<OutputNoise>& noise, RowUse use) {
   SignalErrors errors = s.declared;
   errors.bridges = errors.bridges || use == RowUse::driving;
+  errors.interpolates = errors.interpolates && use == RowUse::learning;
   // Noise that is learnt is that of one moment of change; the truth may have another. Thresholds learn from residuals,
   // which any moment is in.
   errors.held_between = use == RowUse::learning && !s.noise_complete && s.measurement.hold == Hold::zero_order &&

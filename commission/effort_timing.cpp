@@ -77,6 +77,48 @@ double score_of(const Shifted& from, const Shifted& to, Eigen::Index outputs) {
   return limit > 0.0 ? from.more.dot(from.residual) / limit : 0.0;
 }
 
+// `rows` averaged over `reach` instants to either side, with weights that fall to zero, where there are as many. Rows
+// between two instants are interpolated, which averages the noise of the two: of noise that hardly changes from one
+// instant to the next nothing is lost by that, and no shift is made to look better than none.
+RegressionBlock averaged(const RegressionBlock& rows, std::size_t reach) {
+  const std::size_t many = 2 * reach + 1;
+  std::vector<double> weight(many);
+  for (std::size_t k = 0; k < many; ++k) {
+    weight[k] = static_cast<double>(std::min(k + 1, many - k)) / static_cast<double>((reach + 1) * (reach + 1));
+  }
+  std::vector<std::size_t> first;
+  for (std::size_t k = 0; k + many <= rows.instants(); ++k) {
+    if (rows.sample[k + many - 1] - rows.sample[k] == many - 1) {
+      first.push_back(k);
+    }
+  }
+  RegressionBlock means;
+  means.resize(first.size(), rows.outputs, rows.parameters);
+  means.dY.setZero();
+  means.dy.setZero();
+  const auto n = static_cast<Eigen::Index>(rows.outputs);
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const auto to = static_cast<Eigen::Index>(i) * n;
+    means.sample[i] = rows.sample[first[i] + reach];
+    means.t[i] = 0.0;
+    means.Y.middleRows(to, n).setZero();
+    means.y.segment(to, n).setZero();
+    for (std::size_t k = 0; k < many; ++k) {
+      const auto from = static_cast<Eigen::Index>(first[i] + k) * n;
+      means.t[i] += weight[k] * rows.t[first[i] + k];
+      means.Y.middleRows(to, n) += weight[k] * rows.Y.middleRows(from, n);
+      means.y.segment(to, n) += weight[k] * rows.y.segment(from, n);
+    }
+  }
+  return means;
+}
+
+// Instants to either side that rows are averaged over: within the memory of the filter, in which little changes.
+std::size_t averaged_over(const Setting& s) {
+  constexpr double kMost = 5.0, kOfMemory = 0.25;
+  return static_cast<std::size_t>(std::min(kMost, kOfMemory / (s.filter.beta * s.survey.median_step)));
+}
+
 // The rows as logged, without bounds on their errors; nothing where they are too few, or efforts have no sign.
 std::optional<RegressionBlock> rows_as_logged(LogSource& log, const Setting& s, std::size_t most_rows) {
   if (s.measurement.effort_unsigned) {
@@ -85,10 +127,8 @@ std::optional<RegressionBlock> rows_as_logged(LogSource& log, const Setting& s, 
   Setting as_logged = s;  // a declared delay is compared with what is found, not taken away before
   as_logged.measurement.delay = {0.0, 0.0};
   TorqueRows stream = make_rows(log, as_logged, errors_of_fit(s));
-  RegressionBlock rows = first_rows(stream, most_rows);
+  RegressionBlock rows = averaged(first_rows(stream, most_rows), averaged_over(s));
   log.rewind();
-  rows.dY.setZero();
-  rows.dy.setZero();
   return rows.instants() < kFewestInstants ? std::nullopt : std::optional(std::move(rows));
 }
 

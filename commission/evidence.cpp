@@ -86,6 +86,7 @@ Explained explained_by_errors(LogSource& log, const Setting& s, const Fit& fit, 
   between.speed.setZero();
   between.output.setZero();
   between.bridges = false;  // as rows of the fit are
+  between.interpolates = errors_of_fit(s).interpolates;
   TorqueRows fitted_stream = make_rows(log, s, errors_of_fit(s));
   const RegressionBlock rows = first_rows(fitted_stream, most_rows);
   TorqueRows bounded_stream = make_rows(log, s, between);

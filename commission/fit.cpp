@@ -78,6 +78,16 @@ identify::ResidualSummary summarise(core::RegressionSource& rows, const Fit& fit
   return summary;
 }
 
+// What is left of the rows of a detector, which goes on over rows that are lost.
+identify::ResidualSummary of_detectors_rows(LogSource& log, const Setting& s, Part part, const Fit& fit) {
+  filter::SignalErrors errors = errors_of_fit(s);
+  errors.interpolates = false;
+  errors.bridges = true;
+  TorqueRows stream = make_rows(log, s, errors);
+  FoldedSource rows(stream, part, s.survey.rows, s.folds);
+  return summarise(rows, fit);
+}
+
 // Where the noise of the motion is not known: parameters of outputs alone whose efforts the motion does not explain may
 // be made of it, and so may inertias (which are not zero) that are not told from zero.
 void judge_unexplained(const Model& model, const identify::ResidualSummary& residuals,
@@ -135,6 +145,7 @@ identify::RegressionMoments log_moments(LogSource& log, const Setting& s, Part p
 filter::SignalErrors errors_of_fit(const Setting& s) {
   filter::SignalErrors errors = s.declared;
   errors.between_samples = errors.bridges = false;
+  errors.interpolates = loses_often(s.survey);
   return errors;
 }
 
@@ -213,6 +224,9 @@ Fit fit_log(LogSource& log, const Setting& s, Part part, double risk) {
   }
   if (!s.noise_complete) {
     fit.plausible = identify::largest_plausible_error(rows, fit.estimate, fit.residuals, risk);
+    if (loses_often(s.survey)) {
+      fit.watched = of_detectors_rows(log, s, part, fit);
+    }
   }
   return fit;
 }

@@ -151,6 +151,8 @@ Setting settle(LogSource& log, const Robot& robot, const SettingOptions& options
                                     .largest_step = s.survey.largest_step});
     s.declared.motion.limit =
         coordinate_limit(s.model, acceleration_limit(s.robot, s.survey, s.measurement.motion, budget.sensors.motion));
+  } else {
+    s.declared.interpolates = loses_often(s.survey);  // noise is learnt from rows of a fit, and the set is of the same
   }
   return s;
 }

@@ -11,6 +11,8 @@
 namespace wheelwright::commission {
 namespace {
 
+constexpr double kMostLost = 6.5;  // nominal steps: five rows
+
 // The last two windows of one joint.
 class JointWatch {
  public:
@@ -99,6 +101,34 @@ class JointWatch {
   double direction_ = 0.0;
 };
 
+// Rows between two losses: how often they come, and how their number scatters.
+class LossWatch {
+ public:
+  explicit LossWatch(double median_step) : median_step_(median_step) {}
+
+  void restart() { rows_ = 0.0; }
+
+  void add(double step) {
+    rows_ += 1.0;
+    if (step > 1.5 * median_step_ && step < kMostLost * median_step_) {
+      losses_ += 1.0;
+      sum_ += rows_;
+      squares_ += rows_ * rows_;
+      rows_ = 0.0;
+    }
+  }
+
+  void tell(Survey& s) const {
+    s.losses = static_cast<std::size_t>(losses_);
+    const double mean = sum_ / std::max(losses_, 1.0);
+    s.losses_scatter = mean > 0.0 ? std::sqrt(std::max(squares_ / losses_ - mean * mean, 0.0)) / mean : 0.0;
+  }
+
+ private:
+  double median_step_;
+  double rows_ = 0.0, losses_ = 0.0, sum_ = 0.0, squares_ = 0.0;
+};
+
 }  // namespace
 
 Survey survey(LogSource& log, const Measurement& measurement) {
@@ -112,6 +142,7 @@ Survey survey(LogSource& log, const Measurement& measurement) {
   const std::vector<std::size_t> pick = core::positions_of(log, measurement.motion_columns);
   std::vector<JointWatch> watch(joints);
   const bool is_angle = measurement.motion == MotionKind::angle;
+  LossWatch losses(s.median_step);
   double segment_start = 0.0;
   double before = 0.0;
   const auto close_segment = [&] {
@@ -128,11 +159,13 @@ Survey survey(LogSource& log, const Measurement& measurement) {
       }
       ++s.segments;
       segment_start = t;
+      losses.restart();
       for (JointWatch& w : watch) {
         w.restart();
       }
     } else {
       s.largest_step = std::max(s.largest_step, t - before);
+      losses.add(t - before);
     }
     before = t;
     for (std::size_t j = 0; j < joints; ++j) {
@@ -143,11 +176,18 @@ Survey survey(LogSource& log, const Measurement& measurement) {
   if (s.segments > 0) {
     close_segment();
   }
+  losses.tell(s);
   log.rewind();
   for (JointWatch& w : watch) {
     s.change_noise.push_back(w.change_noise());
   }
   return s;
+}
+
+bool loses_often(const Survey& survey) {
+  constexpr double kOften = 2.0;     // 1/s
+  constexpr double kAtRandom = 0.5;  // of Survey::losses_scatter
+  return static_cast<double>(survey.losses) > kOften * survey.seconds && survey.losses_scatter > kAtRandom;
 }
 
 double acceleration_by_noise(const Survey& survey, std::size_t j, MotionKind motion, double motion_error,

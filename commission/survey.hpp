@@ -20,6 +20,9 @@ struct Survey {
   double longest_segment = 0.0;              ///< s
   double median_step = 0.0;                  ///< s
   double largest_step = 0.0;                 ///< within a segment, s
+  std::size_t losses = 0;                    ///< steps within a segment of 1.5 to 6.5 median ones
+  double losses_scatter = 0.0;               ///< standard deviation of the rows between two losses over their mean: near
+                                             ///< 1 where rows are lost at random, 0 where each n-th step is a long one
   std::vector<double> largest_speed;         ///< per joint, |speed|, rad/s or m/s
   std::vector<double> largest_acceleration;  ///< per joint, over windows of kSurveyWindow steps, rad/s² or m/s²
   std::vector<double> sharpest_change;       ///< per joint, from one step to the next, of the speed over time, noise
@@ -28,6 +31,10 @@ struct Survey {
                                      ///< one step to the next, by third differences of at most 65,536 speeds
   std::vector<double> reversals;     ///< per joint: how often its speed changed sign
 };
+
+/// Whether rows are lost more often than twice a second, and at random (Survey::losses_scatter above a half): between
+/// most losses no row of the filter is settled then. Steps that are long at even distances are the log's own.
+[[nodiscard]] bool loses_often(const Survey& survey);
 
 /// What the noise of the samples alone may show as the largest acceleration of joint `j` from one step to the next:
 /// errors of `motion_error` (of the motion column, rad or rad/s), or the largest that `change_noise` makes in so many

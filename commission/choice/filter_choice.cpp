@@ -29,8 +29,9 @@ constexpr double kShareOfLog = 0.2;  // of the longest segment that a filter may
 // One candidate's filter with a fit for each output.
 class Trial {
  public:
-  Trial(const Model& model, const Measurement& measurement, const FilterDesign& design)
-      : filter_(model, design, measurement), fits_(model.n(), identify::LeastSquares(model.p())) {
+  Trial(const Model& model, const Measurement& measurement, const FilterDesign& design,
+        const filter::SignalErrors& errors)
+      : filter_(model, design, measurement, errors), fits_(model.n(), identify::LeastSquares(model.p())) {
     row_.resize(1, 1, model.p());
   }
   void restart() { filter_.restart(); }
@@ -94,8 +95,10 @@ FilterChoice by_residual(LogSource& log, const Model& model, const Measurement& 
                          const Survey& survey, const FilterChoiceOptions& options) {
   const Range range(measurement, order, survey, options);
   std::vector<Trial> trials;
+  filter::SignalErrors errors;
+  errors.interpolates = loses_often(survey);  // or slow filters would settle on few rows
   for (const double beta : range.candidates()) {
-    trials.emplace_back(model, measurement, design_of(order, beta));
+    trials.emplace_back(model, measurement, design_of(order, beta), errors);
   }
   FilterChoice choice;
   if (trials.empty()) {

@@ -12,7 +12,8 @@
 namespace wheelwright::filter {
 namespace {
 
-constexpr double kAlike = 0.05;  // relative: steps alike enough for a parabola through past efforts
+constexpr double kInterpolated = 6.5;  // nominal steps: five rows are lost
+constexpr double kAlike = 0.05;        // relative: steps alike enough for a parabola through past efforts
 
 // result = |matrix| · x.
 void multiply_sizes(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& x, Eigen::VectorXd& result) {
@@ -62,6 +63,9 @@ ElementFilter::ElementFilter(Model model, Measurement measurement, SignalErrors 
     back += steps_within(-measurement_.delay.lower, measurement_.nominal_step);
   }
   longest_ = measurement_.longest_step();
+  if (errors_.interpolates && measurement_.motion != MotionKind::mean_speed) {
+    longest_ = std::max(longest_, kInterpolated * measurement_.nominal_step);
+  }
   if (errors_.acceleration.size() == 0) {
     errors_.acceleration = errors_.speed = errors_.speed_sample = Eigen::VectorXd::Zero(coordinates);
   }
@@ -272,9 +276,15 @@ bool ElementFilter::measure_effort(std::size_t age) {
     }
     each(joints, [&](Eigen::Index j) { falling_in_[j] = 0.25 * (low_[j] + high_[j]); });
   } else if (!mean && held) {
+    // Held values on a line from the one at the beginning to the one at the end, of which the latter acts later.
+    const double rows = std::round(present().length / measurement_.nominal_step);
+    const bool lost = errors_.interpolates && present().length > measurement_.longest_step();
+    const double share = lost ? 0.5 * (rows - 1.0) / rows : 0.0;
     each(joints, [&](Eigen::Index j) {
-      low_[j] = high_[j] = now.over[j];
-      falling_in_[j] = 0.5 * now.over[j];
+      const double held_there = now.over[j] + share * (now.effort[j] - now.over[j]);
+      low_[j] = lost ? std::min(now.over[j], now.effort[j]) : held_there;
+      high_[j] = lost ? std::max(now.over[j], now.effort[j]) : held_there;
+      falling_in_[j] = 0.5 * held_there;
     });
   } else if (!mean || held) {  // of means, the stamp is in the middle of the step
     const Eigen::VectorXd& begin = mean ? now.over : before.effort;
@@ -500,7 +510,7 @@ ElementFilter::EffortWeights ElementFilter::effort_weights() const {
   const bool held = measurement_.hold == Hold::zero_order;
   const bool mean = measurement_.motion == MotionKind::mean_speed;
   const bool between = measurement_.changes == model::EffortChanges::between;
-  if (ranged_ || sharpening_.upper > 0.0 || !corrector_.empty() || measurement_.effort_unsigned || (held && between)) {
+  if (ranged_ || errors_.interpolates || sharpening_.upper > 0.0 || !corrector_.empty() || measurement_.effort_unsigned || (held && between)) {
     return {};
   }
   const double a = element_.before, b = element_.step;

@@ -51,6 +51,9 @@ struct SignalErrors {
   bool between_samples = false;  ///< dY and dy hold what motion and efforts may do between two samples as well
   bool held_between = false;     ///< dy holds what held efforts that change between samples may do there, in any case
   MotionBound motion{};          ///< how fast the motion can change between two samples
+  bool interpolates = false;     ///< up to five rows that are lost are a step of angles or speeds like any other: held
+      ///< efforts are the mean of those at its ends, in error by half their difference. For a fit,
+      ///< where rows are lost so often that few are settled between
   bool bridges = false;  ///< where rows are lost a segment goes on (ElementFilter::bridges). Not for a fit, which takes
                          ///< the noise of all rows for alike
 };
