@@ -56,6 +56,7 @@ constexpr const char* kExamples =
     "Examples:\n"
     "  wheelwright detect drive.csv --model result/model.json --out check\n"
     "  wheelwright detect drive.mcap --model result/model.json --series residual.mcap --layouts\n"
+    "  wheelwright detect drive.csv --model result/model.json --residual d2\n"
     "  robot_driver | wheelwright detect --follow --model result/model.json\n\n"
     "Exit code: 0 no fault, 1 a fault was found, 2 bad input, or it could not be decided: at no instant, at fewer "
     "than\n"
@@ -141,9 +142,19 @@ int follow_input(const Arguments& a, const OnlineModel& model, TorqueDetector de
   return follow(STDIN_FILENO, std::move(detector), model, a.detector, reader, how);
 }
 
+OnlineModel decided_model(const Arguments& a) {
+  OnlineModel model = read_model(a.model);
+  if (a.detector.residual == detector::Residual::d2 && !model.constant) {
+    throw InputError("--residual d2: " + a.model.string() +
+                     " has no constant thresholds: expected a model commissioned from a log of ten blocks as long as "
+                     "the filter's memory at least, or with `thresholds` of all outputs in the robot file");
+  }
+  return detector::decided_by(std::move(model), a.detector.residual);
+}
+
 int run(const Arguments& a) {
   check_together(a);
-  OnlineModel model = read_model(a.model);
+  OnlineModel model = decided_model(a);
   model.persistence = a.persistence.value_or(model.persistence);
   if (model.kinematic) {
     model.kinematic->persistence = a.persistence.value_or(model.kinematic->persistence);
@@ -179,11 +190,16 @@ int run(const Arguments& a) {
       commission::watch_at_risk(log, model, static_cast<std::size_t>(std::max(a.common.threads, 1)));
   commission::EventIsolationOptions isolation;
   isolation.isolation.threads = static_cast<std::size_t>(std::max(a.common.threads, 1));
-  const std::vector<detector::Isolation> isolations = commission::isolate_events(log, model, detection, isolation);
-  std::vector<detector::Incident> incidents =
-      commission::join_events(log, model, detection, isolations, kinematic, isolation);
-  commission::add_sizes(log, model, incidents, isolation.isolation.threads);
-  const bool asked = !detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty());
+  std::vector<detector::Isolation> isolations;
+  std::vector<detector::Incident> incidents;
+  const bool proves = a.detector.residual == detector::Residual::d1;  // isolation stands on bounds
+  if (proves) {
+    isolations = commission::isolate_events(log, model, detection, isolation);
+    incidents = commission::join_events(log, model, detection, isolations, kinematic, isolation);
+    commission::add_sizes(log, model, incidents, isolation.isolation.threads);
+  }
+  const bool asked =
+      proves && (!detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty()));
   const std::optional<commission::OtherParameters> other =
       asked ? commission::explained_by_other_parameters(log, model, detection, kinematic) : std::nullopt;
   const bool fault = !detection.events.empty() || !at_risk.events.empty() ||
@@ -197,7 +213,9 @@ int run(const Arguments& a) {
     results::add_isolation(json, isolations);
     results::add_kinematic(json, kinematic, model);
     results::add_at_risk(json, at_risk, model);
-    results::add_incidents(json, incidents);
+    if (proves) {
+      results::add_incidents(json, incidents);
+    }
     if (asked) {
       results::add_other_parameters(json, other);
     }
@@ -261,6 +279,7 @@ Run add_detect(CLI::App& program) {
   command.add_flag("--layouts", a->layouts,
                    "Write layouts of PlotJuggler and Foxglove that show the --series, beside it (FILE.plotjuggler.xml, "
                    "FILE.foxglove.json)");
+  add_residual(command, a->detector.residual);
   add_set(command, a->detector.set);
   add_test(command, a->detector.test);
   add_persistence(command, a->persistence, "the model's");

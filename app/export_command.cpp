@@ -14,6 +14,7 @@
 #include "formats/files/bytes.hpp"
 #include "formats/robots/online_model_file.hpp"
 #include "results/assumptions_json.hpp"
+#include "results/detection_json.hpp"
 #include "results/software.hpp"
 
 namespace wheelwright::app {
@@ -62,7 +63,10 @@ Json to_json(const Arguments& a, const OnlineModel& model, const TorqueDetector&
     }
   }
   result["vertices"] = vertices;
-  result["warrant"] = core::warrant_word(model.warrant);
+  if (a.detector.residual == detector::Residual::d2) {
+    result["residual"] = "d2";
+  }
+  result["warrant"] = results::threshold_word(model.warrant, a.detector.residual);
   result["assumptions"] = results::assumptions_json(model.assumptions);
   if (file.empty()) {
     result["text"] = text;
@@ -74,13 +78,15 @@ Json to_json(const Arguments& a, const OnlineModel& model, const TorqueDetector&
 }
 
 int run(const Arguments& a) {
-  OnlineModel model = read_model(a.model);
+  OnlineModel model = decided_by(read_model(a.model), a.detector.residual);
   model.persistence = a.persistence.value_or(model.persistence);
   const Detector detector = make_detector(model, a.detector);
   const exporter::CExportOptions options{
       .name = a.name,
       .robot = model.robot.name,
-      .source = fmt::format("{}, thresholds {}", a.model.filename().string(), core::warrant_word(model.warrant)),
+      .source = fmt::format("{}, thresholds {}", a.model.filename().string(),
+                            a.detector.residual == detector::Residual::d2 ? "constant, by experiment, without guarantee"
+                                                                          : core::warrant_word(model.warrant)),
       .software = results::software()};
   const double false_alarms = model.at_risk ? commission::torque_false_alarms(model) : 0.0;
   const std::string text = exporter::c_header(model, a.detector, false_alarms, options);
@@ -116,6 +122,7 @@ Run add_export(CLI::App& program) {
   command.add_option("--name", a->name, "Prefix of all names in the file, and the file's name")
       ->type_name("PREFIX")
       ->capture_default_str();
+  add_residual(command, a->detector.residual);
   add_set(command, a->detector.set);
   add_test(command, a->detector.test);
   add_persistence(command, a->persistence, "the model's");

@@ -192,8 +192,9 @@ class Watch {
         sample_(pick_.size()),
         recorder_(model.model.n(), kMerge) {}
 
-  /// Takes a row, tells an event that begins with it; whether there was a decision.
-  bool take(const LogBlock& row, std::size_t number, Teller& tell, commission::IncidentWatch& incidents) {
+  /// Takes a row, tells an event that begins with it, also to `incidents` where it is not null; whether there was a
+  /// decision.
+  bool take(const LogBlock& row, std::size_t number, Teller& tell, commission::IncidentWatch* incidents) {
     if (!row.segment_starts.empty()) {
       detector_.restart();
     }
@@ -206,9 +207,11 @@ class Watch {
       if (recorder_.add(i, number, row.t[0], c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm)) {
         const detector::Event& event = recorder_.events().back();
         tell([&] { return results::to_json(event, model_); }, [&] { return event_line(event, model_); });
-        incidents.event(event);
-      } else if (c.alarm) {
-        incidents.lasts(row.t[0]);
+        if (incidents) {
+          incidents->event(event);
+        }
+      } else if (c.alarm && incidents) {
+        incidents->lasts(row.t[0]);
       }
     }
     return decision.valid;
@@ -361,11 +364,15 @@ class Blindness {
 ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, const detector::DetectorOptions& options,
                 const logs::CsvOptions& reader, const FollowOptions& how) {
   Teller teller(how);
-  teller.append(files::json_text({{"schema", kEventsSchema},
-                                  {"software", results::software()},
-                                  {"robot", model.robot.name},
-                                  {"warrant", core::warrant_word(model.warrant)}},
-                                 -1));
+  const bool proves = options.residual == detector::Residual::d1;  // isolation stands on bounds
+  Json header = {{"schema", kEventsSchema},
+                 {"software", results::software()},
+                 {"robot", model.robot.name},
+                 {"warrant", results::threshold_word(model.warrant, options.residual)}};
+  if (!proves) {
+    header["residual"] = detector::residual_word(options.residual);
+  }
+  teller.append(files::json_text(header, -1));
   Silence silence(model.measurement.nominal_step, teller);
   files::LineReader in(std::make_unique<Awaited>(stream, silence), kName);
   std::string_view line;
@@ -382,7 +389,9 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
   }
   Watch torque(std::move(detector), *pick, model);
   std::optional<Watch<detector::KinematicDetector>> kinematic;
-  if (model.kinematic) {
+  if (model.kinematic && !proves && !model.kinematic->constant) {
+    tell("wheelwright detect: the model has no constant thresholds of the kinematic residual: it is not watched\n");
+  } else if (model.kinematic) {
     if (const auto pose = pick_columns(parser, model.kinematic->measurement.columns(), missing)) {
       kinematic.emplace(make_detector(*model.kinematic, options), *pose, commission::with_kinematic_outputs(model));
     } else {
@@ -422,6 +431,7 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
         },
         [&] { return fmt::format("incident {}: {}", change, incident_sentence(incident)); });
   };
+  commission::IncidentWatch* const joined = proves ? &incidents : nullptr;
   const auto settle = [&](bool all) {
     for (const commission::IncidentWatch::Told& told : incidents.settle(all)) {
       if (told.closed) {
@@ -460,8 +470,10 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
     for (std::size_t c = 0; c < isolated.size(); ++c) {
       isolated_sample[c] = row.columns[isolated[c]][0];
     }
-    incidents.row(row.t[0], isolated_sample, !row.segment_starts.empty());
-    if (torque.take(row, number, teller, incidents)) {
+    if (joined) {
+      joined->row(row.t[0], isolated_sample, !row.segment_starts.empty());
+    }
+    if (torque.take(row, number, teller, joined)) {
       blindness.decided(row.t[0]);
     } else {
       blindness.undecided(row.t[0]);
@@ -470,7 +482,7 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
       times.push_back(row.t[0]);
     }
     if (kinematic) {
-      kinematic->take(row, number, teller, incidents);
+      kinematic->take(row, number, teller, joined);
     }
     const auto sum = [&](auto& sums, const auto& columns, std::vector<double>& values, auto& recorder) {
       if (!row.segment_starts.empty()) {

@@ -107,6 +107,17 @@ void add_set(CLI::App& command, detector::ParameterSetKind& set) {
       ->type_name("SET");
 }
 
+void add_residual(CLI::App& command, detector::Residual& residual) {
+  command
+      .add_option("--residual", residual,
+                  "Decide by D1, the time-varying threshold of the feasible set, or by D2, the model's constant "
+                  "thresholds by experiment, without guarantee")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, detector::Residual>{{"d1", detector::Residual::d1},
+                                                                                    {"d2", detector::Residual::d2}})
+                      .description("{d1,d2}"))
+      ->type_name("RESIDUAL");
+}
+
 void add_test(CLI::App& command, detector::Test& test) {
   command.add_option("--test", test, "Compare with [l, u] (two_sided) or with rho as the paper does (symmetric)")
       ->transform(

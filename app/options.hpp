@@ -56,6 +56,9 @@ void add_despite(CLI::App& command, CommonOptions& options);
 /// `option`, which may be given several times, with one value each; what follows the value is no further one.
 CLI::Option& repeatable(CLI::Option& option);
 
+/// Adds --residual d1|d2.
+void add_residual(CLI::App& command, detector::Residual& residual);
+
 /// Adds --persistence K/N; `persistence` stays empty where it is not given. `otherwise` says what holds then.
 void add_persistence(CLI::App& command, std::optional<detector::Persistence>& persistence,
                      const std::string& otherwise);

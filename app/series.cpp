@@ -34,12 +34,23 @@ constexpr Curve kResidual[] = {{"residual", "residual", "#1f77b4"},
                                {"upper", "upper threshold", "#d62728"},
                                {"lower", "lower threshold", "#ff7f0e"}};
 
+// D1 of (35) where it decides, and D2 of (39) where there is μ_o.
 template <typename Filter>
-Series write(Series series, LogSource& log, Detector<Filter> detector, double origin) {
+Series write(Series series, LogSource& log, Detector<Filter> detector,
+             const std::optional<detector::ConstantThresholds>& constant, double origin) {
+  const bool d1 = detector.options().residual == detector::Residual::d1;
   std::vector<std::string> names;
   for (const SeriesPlot& plot : series.plots) {
     for (const char* quantity : kQuantities) {
       names.push_back(std::string(quantity) + "_" + plot.name);
+    }
+  }
+  for (const SeriesPlot& plot : series.plots) {
+    if (d1) {
+      names.push_back("d1_" + plot.name);
+    }
+    if (constant) {
+      names.push_back("d2_" + plot.name);
     }
   }
   logs::LogWriteOptions how;
@@ -73,6 +84,15 @@ Series write(Series series, LogSource& log, Detector<Filter> detector, double or
       }
       for (const double value : {of.residual, of.threshold.lower, of.threshold.upper}) {
         widen(series.plots[output].values, value);
+      }
+    }
+    for (std::size_t output = 0; output < decision.channels.size(); ++output) {
+      const detector::ChannelDecision& of = decision.channels[output];
+      if (d1) {
+        out.columns[column++].push_back(of.dead_zone);
+      }
+      if (constant) {
+        out.columns[column++].push_back(detector::dead_zone(of.residual, constant->outputs[output].value));
       }
     }
     if (out.rows() == kRowsAtOnce) {
@@ -172,7 +192,7 @@ Series write_series(const std::filesystem::path& path, LogSource& log, const Onl
                                    commission::output_unit(model.robot, model.model.output_units[output]),
                                    "torque residual"));
   }
-  return write(std::move(series), log, make_detector(model, options), origin);
+  return write(std::move(series), log, make_detector(model, options), model.constant, origin);
 }
 
 Series write_series(const std::filesystem::path& path, LogSource& log, const detector::KinematicModel& model,
@@ -182,7 +202,7 @@ Series write_series(const std::filesystem::path& path, LogSource& log, const det
   for (std::size_t output = 0; output < outputs.n(); ++output) {
     series.plots.push_back(plot_of(outputs.outputs[output], outputs.output_units[output], "kinematic residual"));
   }
-  return write(std::move(series), log, make_detector(model, options), origin);
+  return write(std::move(series), log, make_detector(model, options), model.constant, origin);
 }
 
 std::string foxglove_layout(const std::vector<Series>& series) {

@@ -35,7 +35,8 @@ struct Series {
 [[nodiscard]] std::vector<std::filesystem::path> layout_files(const std::filesystem::path& path);
 
 /// Walks `log` through the detector of `model` and writes `path` (.csv, .mcap, .db3, .h5): for every instant that it
-/// decides the residual, its bounds l and u, ρ, and 0 or 1 for "outside" and "alarm", of each output. Times of a bag
+/// decides the residual, its bounds l and u, ρ, and 0 or 1 for "outside" and "alarm", of each output; then |ε| outside
+/// and 0 inside the dead zone, d1_NAME of (35) where D1 decides and d2_NAME of (39) where the model has μ_o. Times of a bag
 /// get `origin` added (LogWriteOptions::time_origin). Throws InputError where it cannot be written.
 Series write_series(const std::filesystem::path& path, LogSource& log, const OnlineModel& model,
                     const detector::DetectorOptions& options, double origin);

@@ -16,6 +16,7 @@
 #include "commission/assumptions.hpp"
 #include "commission/at_risk/at_risk.hpp"
 #include "commission/at_risk/pose_at_risk.hpp"
+#include "commission/constant_thresholds.hpp"
 #include "commission/contradictions.hpp"
 #include "commission/evidence.hpp"
 #include "commission/fit.hpp"
@@ -831,6 +832,12 @@ Commissioning commission_robot(LogSource& log, const Robot& robot, const Commiss
         },
         [&](LogSource& walk) { set = declared_risk_set(walk, result, at_risk); });
     learn_at_risk(log, result, at_risk, std::move(set));
+  }
+  if (result.has_model()) {
+    learn_constant_thresholds(log, result.model);
+    if (result.model.kinematic) {
+      result.kinematic.model->constant = result.model.kinematic->constant;
+    }
   }
   return result;
 }

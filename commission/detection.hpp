@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "detector/detector_options.hpp"
 #include "detector/events.hpp"
 #include "detector/learnt_model.hpp"
 
@@ -32,6 +33,7 @@ struct Trace {
 
 /// Result of a detector over a whole log.
 struct Detection {
+  detector::Residual residual = detector::Residual::d1;  ///< that decided
   std::vector<detector::Event> events;
   std::size_t rows = 0;              ///< rows of the log
   std::size_t instants = 0;          ///< instants with a decision

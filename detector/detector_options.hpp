@@ -4,6 +4,7 @@
 #pragma once
 
 #include <optional>
+#include <string_view>
 
 #include <Eigen/Core>
 
@@ -23,6 +24,17 @@ enum class Test {
   symmetric,  ///< |ε| <= ρ: the paper's (35)
 };
 
+/// Residual that decides.
+enum class Residual {
+  d1,  ///< D1 of (35): the time-varying threshold of the feasible set
+  d2,  ///< D2 of (39): a constant threshold μ_o for each output, by experiment, without guarantee
+};
+
+/// "d1" or "d2".
+[[nodiscard]] constexpr std::string_view residual_word(Residual residual) {
+  return residual == Residual::d2 ? "d2" : "d1";
+}
+
 /// Options of a detector.
 struct DetectorOptions {
   ParameterSetKind set = ParameterSetKind::polytope;
@@ -31,6 +43,7 @@ struct DetectorOptions {
   /// fault_margin.hpp.
   std::optional<Persistence> persistence{};
   std::optional<Eigen::VectorXd> mu{};  ///< μ_o of (39), one for each output: constant thresholds instead of ρ(t)
+  Residual residual = Residual::d1;     ///< d2: make_detector() takes μ_o from the model (LearntSet::constant)
 };
 
 }  // namespace wheelwright::detector

@@ -3,6 +3,7 @@
 /// Learnt model: the numbers of a commissioned model that a detector needs.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -21,6 +22,34 @@
 
 namespace wheelwright::detector {
 
+/// Constant threshold μ_o of one output, and what driving that was held out says of it.
+struct ConstantThreshold {
+  double value = 0.0;        ///< μ_o, unit of the output, >= 0
+  bool stated = false;       ///< by the robot file; else the largest |ε| of all blocks
+  std::size_t held_out = 0;  ///< blocks on which a threshold was tried: of the others (stated: this one, on all)
+  std::size_t exceeded = 0;  ///< of these, with |ε| above it
+  double chance = 1.0;       ///< that so many or more exceed it if blocks can be exchanged; stated: 1
+};
+
+/// Constant thresholds μ_o of (39), found by experiment (commission/constant_thresholds.hpp) or stated. **Without
+/// guarantee.** For an output whose threshold was found the promise is: a further block of driving exceeds it with a
+/// probability of at most 1/(blocks + 1), if it can be exchanged with those of the log (the same robot, ground and kind
+/// of driving) and θ̂ of the whole log predicts no worse than one that lacks a block.
+struct ConstantThresholds {
+  double block = 0.0;        ///< s, length of a block; 0 where all thresholds are stated and the log has no blocks
+  std::size_t blocks = 0;    ///< number of blocks of the log
+  std::size_t learning = 0;  ///< blocks of whose maxima the thresholds that were tried are the largest
+  std::vector<ConstantThreshold> outputs{};
+
+  /// μ_o.
+  [[nodiscard]] Eigen::VectorXd mu() const;
+  /// Probability of a false alarm in a block, in any output whose threshold was found; nothing where some are stated.
+  [[nodiscard]] std::optional<double> false_alarms() const;
+  /// True if more of the blocks that were held out exceeded their threshold than the promise lets expect, at 1 % over
+  /// all outputs.
+  [[nodiscard]] bool refuted() const;
+};
+
 /// Parameter set of one residual, learnt from a fault-free log, and its alarm rule.
 struct LearntSet {
   Eigen::VectorXd estimate{};  ///< θ̂; for a parameter that the log does not excite, the Chebyshev centre's value
@@ -28,6 +57,7 @@ struct LearntSet {
   Box box{};                                ///< finite box that bounds the set (the certified hull)
   Persistence persistence{};
   core::Warrant warrant = core::Warrant::extrapolated;  ///< of set, hull and thresholds
+  std::optional<ConstantThresholds> constant{};         ///< of D2; nothing where the log is too short to find them
 };
 
 /// What is assumed of a pose's errors. Those of x, y and heading at one instant may depend on each other in any way.

@@ -8,12 +8,16 @@
 
 namespace wheelwright::detector {
 
+/// `model` with what decides by `residual`: for D2 without sums at a stated risk, which stand on bounds. Throws
+/// InvalidArgument for D2 where the model has no constant thresholds of the torque residual.
+[[nodiscard]] OnlineModel decided_by(OnlineModel model, Residual residual);
+
 /// The filter of a channel.
 [[nodiscard]] RegressorFilter make_filter(const OnlineModel& model);
 [[nodiscard]] filter::OdometryFilter make_filter(const KinematicModel& model);
 
 /// The detector of a channel. Where `options` have no persistence it is the model's. Throws InvalidArgument for options
-/// that make no sense.
+/// that make no sense, and for D2 where the model has no constant thresholds.
 [[nodiscard]] TorqueDetector make_detector(const OnlineModel& model, DetectorOptions options = {});
 [[nodiscard]] KinematicDetector make_detector(const KinematicModel& model, DetectorOptions options = {});
 

@@ -168,7 +168,8 @@ struct Robot {
                                 ///< logs add it to `theta`
   bool wheel_directions_checked = false;  ///< somebody saw both wheels count up, efforts > 0, as the robot drives ahead
   std::map<std::string, double> limits;   ///< effort, speed, acceleration
-  std::optional<double> kinematic_window;  ///< s, of the kinematic residual (odometry_filter.hpp)
+  std::optional<double> kinematic_window;      ///< s, of the kinematic residual (odometry_filter.hpp)
+  std::map<std::string, double> thresholds{};  ///< output -> constant threshold μ_o of (39), unit of the output, >= 0
   std::optional<Motor> motor;
   std::vector<RobotEffect> effects;  ///< beyond the basic model, each name once
 };

@@ -30,7 +30,7 @@ namespace {
 struct DetectorRun {
   std::vector<double> t;          // s
   std::vector<std::int64_t> row;  // of the log
-  std::vector<double> residual, predicted, lower, upper;
+  std::vector<double> residual, predicted, lower, upper, dead_zone;
   std::vector<std::uint8_t> outside, alarm;
   std::vector<detector::Event> events;
   std::size_t outputs = 0;
@@ -51,6 +51,7 @@ DetectorRun run_detector(LogSource& log, TorqueDetector& detector, double merge)
       run.predicted.push_back(c.predicted);
       run.lower.push_back(c.threshold.lower);
       run.upper.push_back(c.threshold.upper);
+      run.dead_zone.push_back(c.dead_zone);
       run.outside.push_back(c.outside ? 1 : 0);
       run.alarm.push_back(c.alarm ? 1 : 0);
       recorder.add(i, row, t, c.residual, c.threshold.lower, c.threshold.upper, c.outside, c.alarm);
@@ -64,10 +65,13 @@ constexpr double kMerge = 0.5;  // s, as detect()
 
 }  // namespace
 
-detector::DetectorOptions options_of(const std::string& set, const std::string& test, const Rule& persistence) {
+detector::DetectorOptions options_of(const std::string& set, const std::string& test, const Rule& persistence,
+                                     const std::string& residual) {
   check::that(set == "polytope" || set == "box", "set '" + set + "'", "polytope or box");
   check::that(test == "two_sided" || test == "symmetric", "test '" + test + "'", "two_sided or symmetric");
+  check::that(residual == "d1" || residual == "d2", "residual '" + residual + "'", "d1 or d2");
   detector::DetectorOptions options;
+  options.residual = residual == "d2" ? detector::Residual::d2 : detector::Residual::d1;
   options.set = set == "box" ? detector::ParameterSetKind::box : detector::ParameterSetKind::polytope;
   options.test = test == "symmetric" ? detector::Test::symmetric : detector::Test::two_sided;
   if (persistence) {
@@ -105,7 +109,7 @@ struct DetectorObject {
 // Fields of the last decision, as a robot would read them.
 struct DecisionObject {
   bool fault = false;
-  std::vector<double> residual, predicted, lower, upper, rho;
+  std::vector<double> residual, predicted, lower, upper, rho, dead_zone;
   std::vector<std::uint8_t> outside, alarm;
 };
 
@@ -128,6 +132,7 @@ py::object step(DetectorObject& d, double t, const Doubles& sample) {
     out.lower.push_back(c.threshold.lower);
     out.upper.push_back(c.threshold.upper);
     out.rho.push_back(c.threshold.rho());
+    out.dead_zone.push_back(c.dead_zone);
     out.outside.push_back(c.outside ? 1 : 0);
     out.alarm.push_back(c.alarm ? 1 : 0);
   }
@@ -167,7 +172,9 @@ struct DetectionObject {
     results::add_isolation(json, isolations);
     results::add_kinematic(json, kinematic, *model.model);
     results::add_at_risk(json, at_risk, *model.model);
-    results::add_incidents(json, incidents);
+    if (detection.residual == detector::Residual::d1) {
+      results::add_incidents(json, incidents);
+    }
     if (asked_other) {
       results::add_other_parameters(json, other);
     }
@@ -181,11 +188,12 @@ struct DetectionObject {
 };
 
 DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::string& set, const std::string& test,
-                          const Rule& persistence, std::size_t threads, py::object progress) {
+                          const Rule& persistence, std::size_t threads, const std::string& residual,
+                          py::object progress) {
   LongWork work(std::move(progress));
-  const detector::DetectorOptions options = options_of(set, test, persistence);
+  const detector::DetectorOptions options = options_of(set, test, persistence, residual);
   return work.run([&] {
-    auto model = std::make_shared<OnlineModel>(*given.model);
+    auto model = std::make_shared<OnlineModel>(detector::decided_by(*given.model, options.residual));
     model->persistence = options.persistence.value_or(model->persistence);
     if (model->kinematic) {
       model->kinematic->persistence = options.persistence.value_or(model->kinematic->persistence);
@@ -203,14 +211,17 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
     out.kinematic = commission::watch_kinematics(source, *model, own);
     tell("sums at a stated risk", 0.6);
     out.at_risk = commission::watch_at_risk(source, *model);
-    tell("what the events can be", 0.8);
-    commission::EventIsolationOptions isolation;
-    isolation.isolation.threads = threads;
-    out.isolations = commission::isolate_events(source, *model, out.detection, isolation);
-    out.incidents = commission::join_events(source, *model, out.detection, out.isolations, out.kinematic, isolation);
-    commission::add_sizes(source, *model, out.incidents, isolation.isolation.threads);
-    out.asked_other =
-        !out.detection.events.empty() || (out.kinematic.detection && !out.kinematic.detection->events.empty());
+    const bool proves = options.residual == detector::Residual::d1;  // isolation stands on bounds
+    if (proves) {
+      tell("what the events can be", 0.8);
+      commission::EventIsolationOptions isolation;
+      isolation.isolation.threads = threads;
+      out.isolations = commission::isolate_events(source, *model, out.detection, isolation);
+      out.incidents = commission::join_events(source, *model, out.detection, out.isolations, out.kinematic, isolation);
+      commission::add_sizes(source, *model, out.incidents, isolation.isolation.threads);
+    }
+    out.asked_other = proves && (!out.detection.events.empty() ||
+                                 (out.kinematic.detection && !out.kinematic.detection->events.empty()));
     if (out.asked_other) {
       out.other = commission::explained_by_other_parameters(source, *model, out.detection, out.kinematic);
     }
@@ -263,6 +274,8 @@ void bind_decision(py::module_& m) {
       .def_property_readonly("lower", numbers(&DecisionObject::lower), "l <= residual without a fault")
       .def_property_readonly("upper", numbers(&DecisionObject::upper), "residual <= u without a fault")
       .def_property_readonly("rho", numbers(&DecisionObject::rho), "max(u, -l) (34)")
+      .def_property_readonly("dead_zone", numbers(&DecisionObject::dead_zone),
+                             "D1 (35) or D2 (39): |residual| outside the threshold, else 0")
       .def_property_readonly("outside", truths(&DecisionObject::outside))
       .def_property_readonly("alarm", truths(&DecisionObject::alarm));
 }
@@ -301,6 +314,8 @@ void bind_run(py::module_& m) {
       .def_property_readonly("predicted", numbers(&DetectorRun::predicted), "Y_f theta (30)")
       .def_property_readonly("lower", numbers(&DetectorRun::lower), "l <= residual without a fault")
       .def_property_readonly("upper", numbers(&DetectorRun::upper), "residual <= u without a fault")
+      .def_property_readonly("dead_zone", numbers(&DetectorRun::dead_zone),
+                             "D1 (35) or D2 (39): |residual| outside the threshold, else 0")
       .def_property_readonly("outside", truths(&DetectorRun::outside))
       .def_property_readonly("alarm", truths(&DetectorRun::alarm))
       .def_property_readonly(
@@ -319,15 +334,16 @@ void bind_detector(py::module_& m) {
   py::class_<DetectorObject>(m, "Detector",
                              "Filter, threshold and decision of the paper's section V. step() has a memory and serves "
                              "one thread at a time; run() has none.")
-      .def(py::init(
-               [](const ModelObject& model, const std::string& set, const std::string& test, const Rule& persistence) {
-                 return DetectorObject{model, make_detector(*model.model, options_of(set, test, persistence))};
-               }),
+      .def(py::init([](const ModelObject& model, const std::string& set, const std::string& test,
+                       const Rule& persistence, const std::string& residual) {
+             return DetectorObject{model, make_detector(*model.model, options_of(set, test, persistence, residual))};
+           }),
            py::arg("model"), py::kw_only(), py::arg("set") = "polytope", py::arg("test") = "two_sided",
-           py::arg("persistence") = std::nullopt,
+           py::arg("persistence") = std::nullopt, py::arg("residual") = "d1",
            "set: polytope (the feasible set itself) or box. test: two_sided (l <= residual <= u) or symmetric "
            "(|residual| <= rho, the paper's (35)). persistence: (k, n), an alarm is k of the last n instants outside; "
-           "by default the model's.")
+           "by default the model's. residual: d1, or d2, which decides by the model's constant thresholds, found by "
+           "experiment or stated, without guarantee (the paper's (39)); InvalidArgument where it has none.")
       .def_property_readonly(
           "columns", [](const DetectorObject& d) { return d.detector.filter().measurement().columns(); },
           "columns of a sample, in the order of step()")
@@ -377,8 +393,10 @@ void bind_detector(py::module_& m) {
   tables_of(detection);
   m.def("detect", &detect_in, py::arg("log"), py::arg("model"), py::kw_only(), py::arg("set") = "polytope",
         py::arg("test") = "two_sided", py::arg("persistence") = std::nullopt, py::arg("threads") = 1,
-        py::arg("progress") = py::none(),
+        py::arg("residual") = "d1", py::arg("progress") = py::none(),
         "Looks for faults in a log with a commissioned model, as `wheelwright detect` does.\n\n"
+        "residual: d1, or d2, as in Detector; with d2 nothing is isolated and nothing said at a risk, which both stand "
+        "on bounds.\n\n"
         "The interpreter's lock is released; Ctrl-C ends the work. Raises InputError where the log lacks a column.");
 }
 

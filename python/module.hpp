@@ -202,7 +202,7 @@ using Rule = std::optional<std::pair<std::size_t, std::size_t>>;
 
 /// Throws InvalidArgument for words that are none.
 [[nodiscard]] detector::DetectorOptions options_of(const std::string& set, const std::string& test,
-                                                   const Rule& persistence);
+                                                   const Rule& persistence, const std::string& residual = "d1");
 
 /// A Commission of `result`, made of a log with the report `data`.
 [[nodiscard]] py::object commission_object(const commission::Commissioning& result, const logs::LogReport& data);

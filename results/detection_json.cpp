@@ -10,9 +10,14 @@
 #include "commission/event_isolation.hpp"
 #include "formats/files/json.hpp"
 #include "results/assumptions_json.hpp"
+#include "results/model_json.hpp"
 #include "results/words/detect_words.hpp"
 
 namespace wheelwright::results {
+
+std::string_view threshold_word(core::Warrant warrant, detector::Residual residual) {
+  return residual == detector::Residual::d2 ? "experiment" : core::warrant_word(warrant);
+}
 
 Json to_json(const detector::Event& e, const OnlineModel& model) {
   return {{"output", model.model.outputs[e.output]},
@@ -32,7 +37,7 @@ Json to_json(const Detection& d, const OnlineModel& model, const std::string& mo
                {"software", software},
                {"model", model_file},
                {"log", log},
-               {"warrant", core::warrant_word(model.warrant)},
+               {"warrant", threshold_word(model.warrant, d.residual)},
                {"assumptions", assumptions_json(model.assumptions)},
                {"fault", !d.events.empty()},
                {"rows", d.rows},
@@ -48,6 +53,10 @@ Json to_json(const Detection& d, const OnlineModel& model, const std::string& mo
   }
   for (const detector::Event& event : d.events) {
     json["events"].push_back(to_json(event, model));
+  }
+  if (d.residual == detector::Residual::d2) {
+    json["residual"] = detector::residual_word(d.residual);
+    json["constant_thresholds"] = constant_thresholds_json(*model.constant, model.model.outputs);
   }
   return json;
 }
@@ -218,11 +227,14 @@ void add_kinematic(Json& detection, const commission::KinematicWatch& watch, con
   std::ranges::stable_sort(events, {}, [](const Json& event) { return event.at("alarm").get<double>(); });
   detection["events"] = events;
   detection["fault"] = detection["fault"].get<bool>() || !events.empty();
-  detection["kinematic"] = {{"warrant", core::warrant_word(view.warrant)},
+  detection["kinematic"] = {{"warrant", threshold_word(view.warrant, d.residual)},
                             {"watched", watch.detection.has_value()},
                             {"message", watch.message},
                             {"instants", d.instants},
                             {"seconds", d.seconds}};
+  if (own.contains("constant_thresholds")) {
+    detection["kinematic"]["constant_thresholds"] = own["constant_thresholds"];
+  }
 }
 
 }  // namespace wheelwright::results

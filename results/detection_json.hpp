@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "commission/detection.hpp"
@@ -18,6 +19,9 @@
 #include "formats/files/json.hpp"
 
 namespace wheelwright::results {
+
+/// Word for the warrant of thresholds: that of D1's, "experiment" of D2's, which have none.
+[[nodiscard]] std::string_view threshold_word(core::Warrant warrant, detector::Residual residual);
 
 /// A detection as JSON (results/detection.schema.json). `model_file` and `log` say what was used, `software` is name
 /// and version.

@@ -155,6 +155,9 @@ std::optional<Json> kinematic_json(const commission::KinematicCommissioning& r, 
                         {"yaw_gain", m.errors.yaw_gain},
                         {"estimated", numbers(m.errors.estimated)}}},
                       {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
+  if (m.constant) {
+    json["detector"]["constant_thresholds"] = constant_thresholds_json(*m.constant, m.measurement.outputs());
+  }
   if (m.errors.gyro > 0.0) {
     json["detector"]["error_bounds"]["gyro"] = m.errors.gyro;
   }

@@ -10,6 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "commission/constant_thresholds.hpp"
 #include "commission/physical.hpp"
 #include "formats/files/json.hpp"
 #include "formats/files/words.hpp"
@@ -29,6 +30,26 @@ Json files_json(const logs::LogReport& data) {
     files.push_back({{"path", f.path}, {"hash", f.hash}, {"bytes", f.bytes}, {"rows", f.rows}});
   }
   return files;
+}
+
+Json constant_thresholds_json(const detector::ConstantThresholds& thresholds, const std::vector<std::string>& outputs) {
+  Json list = Json::array();
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const detector::ConstantThreshold& t = thresholds.outputs[i];
+    list.push_back({{"output", outputs[i]},
+                    {"value", t.value},
+                    {"stated", t.stated},
+                    {"held_out", t.held_out},
+                    {"exceeded", t.exceeded},
+                    {"chance", t.chance}});
+  }
+  return {{"block", thresholds.block},
+          {"blocks", thresholds.blocks},
+          {"learning", thresholds.learning},
+          {"false_alarms", files::or_null(thresholds.false_alarms())},
+          {"refuted", thresholds.refuted()},
+          {"outputs", std::move(list)},
+          {"sentence", commission::sentence(thresholds)}};
 }
 
 Json candidates_json(const identify::EstimatorChoice& choice) {
@@ -520,6 +541,9 @@ Json to_json(const Commissioning& r, const logs::LogReport& data, const std::str
     json["detector"] = {{"estimate", numbers(m.estimate)},
                         {"error_bounds", std::move(bounds)},
                         {"persistence", {{"k", m.persistence.k}, {"n", m.persistence.n}}}};
+    if (m.constant) {
+      json["detector"]["constant_thresholds"] = constant_thresholds_json(*m.constant, m.model.outputs);
+    }
   }
   if (m.at_risk) {
     json["at_risk"] = risk_json(*m.at_risk, *r.at_risk, m.model);

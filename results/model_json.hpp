@@ -63,6 +63,10 @@ inline constexpr const char* kPoseSum = "pose";
 /// Lower and upper end of each side.
 [[nodiscard]] Json sides_json(const Box& box);
 
+/// Constant thresholds of `outputs` (definition constant_thresholds of model.schema.json).
+[[nodiscard]] Json constant_thresholds_json(const detector::ConstantThresholds& thresholds,
+                                            const std::vector<std::string>& outputs);
+
 /// What is known of one column's errors, without a deviation that is no less than the bound.
 [[nodiscard]] Json error_class_json(const filter::ErrorClass& c);
 

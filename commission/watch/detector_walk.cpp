@@ -130,6 +130,7 @@ template <filter::RowFilter Filter>
 Detection detect(LogSource& log, Detector<Filter> detector, const DetectionOptions& options) {
   const std::size_t n = detector.filter().outputs();
   Detection d;
+  d.residual = detector.options().residual;
   d.outside.assign(n, 0);
   d.utilisation.assign(n, 0.0);
   d.nrmse.assign(n, 0.0);
@@ -437,6 +438,7 @@ OnlineModel with_kinematic_outputs(const OnlineModel& model) {
   view.model = model.kinematic ? detector::kinematic_outputs(*model.kinematic) : Model{};
   view.persistence = model.kinematic ? model.kinematic->persistence : model.persistence;
   view.warrant = model.kinematic ? model.kinematic->warrant : model.warrant;
+  view.constant = model.kinematic ? model.kinematic->constant : std::nullopt;
   return view;
 }
 
@@ -453,6 +455,9 @@ KinematicWatch watch_kinematics(LogSource& log, const OnlineModel& model, const 
   }
   if (!missing.empty()) {
     return {std::nullopt, "the log has no " + missing};
+  }
+  if (options.residual == detector::Residual::d2 && !model.kinematic->constant) {
+    return {std::nullopt, "the model has no constant thresholds of it"};
   }
   return {detect(log, make_detector(*model.kinematic, options), detection), {}};
 }

@@ -10,6 +10,7 @@
 
 #include "bounds/polytope.hpp"
 #include "core/error.hpp"
+#include "core/words.hpp"
 #include "detector/multiscale/pose_sums.hpp"
 #include "detector/multiscale/scale_detector.hpp"
 #include "detector/online_model.hpp"
@@ -48,6 +49,29 @@ detector::Persistence persistence_at(const JsonPlace& place) {
     place.fail("1 <= k <= n");
   }
   return rule;
+}
+
+/// Constant thresholds of `outputs` in the detector at `place`; nothing where it has none.
+std::optional<detector::ConstantThresholds> constant_at(const JsonPlace& place,
+                                                        const std::vector<std::string>& outputs) {
+  if (!place.has("constant_thresholds")) {
+    return std::nullopt;
+  }
+  const JsonPlace all = place.at("constant_thresholds"), list = all.at("outputs");
+  detector::ConstantThresholds thresholds{
+      bound_at(all.at("block")), all.at("blocks").count(), all.at("learning").count(), {}};
+  if (list.size() != outputs.size()) {
+    list.fail("one threshold for each of the outputs " + core::listed(outputs));
+  }
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const JsonPlace each = list.at(i);
+    if (each.at("output").text() != outputs[i]) {
+      each.at("output").fail(outputs[i]);
+    }
+    thresholds.outputs.push_back({bound_at(each.at("value")), each.at("stated").boolean(), each.at("held_out").count(),
+                                  each.at("exceeded").count(), bound_at(each.at("chance"))});
+  }
+  return thresholds;
 }
 
 /// What bounds motion and efforts between samples; null where nothing does.
@@ -347,6 +371,7 @@ std::optional<detector::KinematicModel> kinematic_from_json(const JsonPlace& pla
   model.errors.yaw_gain = bound_at(errors.at("yaw_gain"));
   model.errors.estimated = bounds_at(errors.at("estimated"), n);
   model.persistence = persistence_at(detector.at("persistence"));
+  model.constant = constant_at(detector, model.measurement.outputs());
   take_set(set, p, model.facets, model.box);
   try {
     static_cast<void>(detector::make_filter(model));
@@ -376,6 +401,7 @@ OnlineModel model_from_json(const Json& json, const std::string& file) {
   model.estimate = vector_at(detector.at("estimate"), p);
   model.errors = read_errors(detector.at("error_bounds"), model.model);
   model.persistence = persistence_at(detector.at("persistence"));
+  model.constant = constant_at(detector, model.model.outputs);
   take_set(root.at("feasible_set"), p, model.facets, model.box);
   if (root.has("kinematic")) {
     model.kinematic = kinematic_from_json(root.at("kinematic"), model.robot);

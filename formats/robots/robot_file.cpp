@@ -63,7 +63,8 @@ struct RobotReader {
                                        "heading_offset", "limits",
                                        "kinematic",      "motor",
                                        "effects",        "columns",
-                                       "clock",          "wheel_directions"});
+                                       "clock",          "wheel_directions",
+                                       "thresholds"});
     for (const auto& [key, place] : members) {
       read_basics(key, place);
     }
@@ -158,6 +159,12 @@ struct RobotReader {
     } else if (key == "kinematic") {
       for (const auto& [name, value] : place.members({"window"})) {
         robot.kinematic_window = value.positive();
+      }
+    } else if (key == "thresholds") {
+      const Names outputs =
+          drive(robot) ? Names{"sum", "difference", "longitudinal", "lateral", "yaw", "gyro_yaw"} : Names{"effort"};
+      for (const auto& [name, value] : place.members(outputs)) {
+        robot.thresholds[name] = value.positive();
       }
     } else if (key == "limits") {
       for (const auto& [name, value] : place.members({"effort", "speed", "acceleration"})) {
@@ -579,6 +586,9 @@ Json to_json(const Robot& robot) {
   }
   if (robot.kinematic_window) {
     out["kinematic"] = {{"window", *robot.kinematic_window}};
+  }
+  for (const auto& [name, value] : robot.thresholds) {
+    out["thresholds"][name] = value;
   }
   if (robot.motor) {
     out["motor"] = motor_of(*robot.motor);

@@ -101,7 +101,7 @@ def _run(r: core.DetectorRun) -> Shown:
 def _run_frame(r: core.DetectorRun) -> _Columns:
     n = len(r.outputs)
     table: _Columns = {"t": np.repeat(r.t, n), "row": np.repeat(r.row, n), "output": r.outputs * len(r)}
-    for name in ("predicted", "residual", "lower", "upper", "outside", "alarm"):
+    for name in ("predicted", "residual", "lower", "upper", "dead_zone", "outside", "alarm"):
         table[name] = getattr(r, name).ravel()
     return table
 

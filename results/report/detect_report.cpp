@@ -10,7 +10,9 @@
 
 #include <fmt/format.h>
 
+#include "commission/constant_thresholds.hpp"
 #include "commission/event_isolation.hpp"
+#include "commission/physical.hpp"
 #include "commission/watch/other_parameters.hpp"
 #include "core/limits.hpp"
 #include "results/report/drawing.hpp"
@@ -71,6 +73,21 @@ std::string output_table(const Detection& detection, const OnlineModel& model) {
              "the threshold. NRMSE: rms of the residual over rms of the filtered effort.</span>");
 }
 
+// Constant thresholds, and what was tried of them.
+std::string constant_section(const detector::ConstantThresholds& thresholds, const OnlineModel& model) {
+  std::vector<std::vector<Cell>> rows;
+  for (std::size_t i = 0; i < thresholds.outputs.size(); ++i) {
+    const detector::ConstantThreshold& t = thresholds.outputs[i];
+    rows.push_back({escape(output_name(model.model, i)), numeric(number(t.value)),
+                    escape(unit_of(commission::output_unit(model.robot, model.model.output_units[i]))),
+                    t.stated ? "the robot file" : "experiment", numeric(count(t.held_out)),
+                    numeric(count(t.exceeded))});
+  }
+  return paragraph(escape(core::capital(commission::sentence(thresholds))) + ".") +
+         table({"Output", numeric("μ_o"), "unit", "from", numeric("blocks<br>tried on"), numeric("of these<br>above")},
+               rows);
+}
+
 std::string kinematic_section(const KinematicFindings& kinematic, const OnlineModel& model, const TimeAxis& axis) {
   if (!kinematic.detection || !model.kinematic) {
     return paragraph("The kinematic residual was not watched: " +
@@ -87,11 +104,14 @@ std::string kinematic_section(const KinematicFindings& kinematic, const OnlineMo
       marks[d.events[k].output].push_back({d.events[k].start, d.events[k].end, "K" + std::to_string(k + 1)});
     }
   }
-  return paragraph(
-             fmt::format("What pose or gyro saw over the last {} against what the wheels rolled: {} instants over "
-                         "{} of driving. Without a fault the residual stays inside the grey band.",
-                         with_unit(number(model.kinematic->window), "s"), count(d.instants),
-                         with_unit(number(d.seconds, 4), "s"))) +
+  return paragraph(fmt::format(
+             "What pose or gyro saw over the last {} against what the wheels rolled: {} instants over "
+             "{} of driving. {}",
+             with_unit(number(model.kinematic->window), "s"), count(d.instants), with_unit(number(d.seconds, 4), "s"),
+             d.residual == detector::Residual::d2 ? "The grey band is [−μ_o, μ_o] of D2, without guarantee."
+                                                  : "Without a fault the residual stays inside the grey "
+                                                    "band.")) +
+         (d.residual == detector::Residual::d2 ? constant_section(*model.kinematic->constant, names) : std::string()) +
          event_table(d, names, axis) + output_table(d, names) +
          (d.trace.t.empty() ? std::string()
                             : residual_charts(d.trace, names.robot, names.model, marks, axis, "kinematic") +
@@ -245,7 +265,10 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
         core::capital(plural(kinematic_events, "event")), axis.text(first.alarm)));
   }
   content.software = context.software;
-  content.warrant = model.warrant;
+  const bool d2 = detection.residual == detector::Residual::d2;
+  if (!d2) {
+    content.warrant = model.warrant;
+  }
   content.sections.push_back({"events", "Events", event_table(detection, model, axis)});
   if (at_risk.watched) {
     content.sections.push_back({"at_risk", "At a stated risk", at_risk_section(at_risk, model, axis)});
@@ -256,12 +279,20 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   if (std::string sizes = sizes_section(incidents); !sizes.empty()) {
     content.sections.push_back({"sizes", "How large, over time", std::move(sizes)});
   }
+  if (d2) {
+    content.sections.push_back({"thresholds", "Constant thresholds", constant_section(*model.constant, model)});
+  }
   if (!detection.trace.t.empty()) {
     content.sections.push_back(
         {"residual", "Residual and threshold",
-         paragraph(
-             "Without a fault ε = τ_f − Y_f θ̂ stays inside the grey band [l, u]. Events are shaded and "
-             "numbered. Drag to zoom (all charts follow), Shift and drag to pan, double click for the whole log.") +
+         paragraph(d2 ? "The grey band is [−μ_o, μ_o] of D2, without guarantee: ε = τ_f − Y_f θ̂ of a healthy robot "
+                        "leaves it no "
+                        "more often than the thresholds promise, if they hold. Events are shaded and numbered. Drag to "
+                        "zoom (all charts "
+                        "follow), Shift and drag to pan, double click for the whole log."
+                      : "Without a fault ε = τ_f − Y_f θ̂ stays inside the grey band [l, u]. Events are shaded and "
+                        "numbered. Drag to zoom (all charts follow), Shift and drag to pan, double click for the whole "
+                        "log.") +
              residual_charts(detection.trace, model.robot, model.model, marks, axis, "trace") +
              torque_charts(detection.trace, model.robot, model.model, axis, "trace") +
              thinning_note(detection.instants, detection.trace.t.size(), "instants")});

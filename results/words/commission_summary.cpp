@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "commission/assumptions.hpp"
+#include "commission/constant_thresholds.hpp"
 #include "commission/physical.hpp"
 #include "core/statistics.hpp"
 #include "results/words/commission_words.hpp"
@@ -79,6 +80,9 @@ std::string kinematic_table(const commission::KinematicCommissioning& k) {
     const commission::OutputValidation& v = k.validation[i];
     text += fmt::format("  held out, {}: {} false alarms in {} instants, median width of the threshold {:.3g} {}\n",
                         outputs[i], v.outside, v.instants, v.median_width, units[i]);
+  }
+  if (k.model && k.model->constant) {
+    text += fmt::format("  D2, pose or gyro: {}\n", commission::sentence(*k.model->constant));
   }
   return text;
 }
@@ -178,6 +182,9 @@ std::string summary(const Commissioning& r) {
   }
   if (!r.validation.empty() && r.model.warrant != core::Warrant::guaranteed) {
     text += fmt::format("  {}\n", certain_meaning(r.model.warrant));
+  }
+  if (r.model.constant) {
+    text += fmt::format("  D2: {}\n", commission::sentence(*r.model.constant));
   }
   text += reach_lines(r);
   text += kinematic_table(r.kinematic);

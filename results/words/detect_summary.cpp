@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "commission/constant_thresholds.hpp"
 #include "results/words/commission_words.hpp"
 #include "results/words/detect_words.hpp"
 
@@ -91,6 +92,18 @@ std::string silence_line(const commission::StreamSilence& silence) {
       silence.until ? fmt::format(" until {:.3f} s", *silence.until) : "", silence.seconds);
 }
 
+namespace {
+
+// What the thresholds stand on, a line.
+std::string thresholds_line(const Detection& d, const OnlineModel& model) {
+  if (d.residual == detector::Residual::d2) {
+    return fmt::format("  {}\n", commission::sentence(*model.constant));
+  }
+  return fmt::format("  thresholds: {}\n", core::warrant_word(model.warrant));
+}
+
+}  // namespace
+
 std::string summary(const Detection& d, const OnlineModel& model) {
   std::string text;
   if (d.instants == 0) {
@@ -109,7 +122,7 @@ std::string summary(const Detection& d, const OnlineModel& model) {
       text += fmt::format("  … and {} more (--json lists them all)\n", d.events.size() - most);
     }
   }
-  text += fmt::format("  thresholds: {}\n", core::warrant_word(model.warrant));
+  text += thresholds_line(d, model);
   for (std::size_t i = 0; i < d.utilisation.size(); ++i) {
     text += fmt::format("  {}: residual {:.2g} % of the torque, at most {:.0f} % of its threshold used\n",
                         model.model.outputs[i], 100.0 * d.nrmse[i], 100.0 * d.utilisation[i]);
@@ -170,7 +183,7 @@ std::string summary(const commission::KinematicWatch& watch, const OnlineModel& 
   if (d.events.size() > most) {
     text += fmt::format("  … and {} more (--json lists them all)\n", d.events.size() - most);
   }
-  text += fmt::format("  thresholds: {}\n", core::warrant_word(view.warrant));
+  text += thresholds_line(d, view);
   for (std::size_t i = 0; i < d.utilisation.size(); ++i) {
     text +=
         fmt::format("  {}: at most {:.0f} % of its threshold used\n", view.model.outputs[i], 100.0 * d.utilisation[i]);

@@ -93,8 +93,11 @@ std::vector<std::string> detect_words(const Detection& detection, const OnlineMo
         fmt::format("The residual stayed inside its threshold or left it too briefly for an alarm; it went {} of the "
                     "way to the threshold at most.",
                     percent(largest(detection.utilisation))),
-        "A fault smaller than the threshold allows for, or one that does not show in this driving, is not excluded: "
-        "`wheelwright margins` says which faults this log would have shown."};
+        detection.residual == detector::Residual::d2
+            ? "A fault smaller than the threshold allows for, or one that does not show in this driving, is not "
+              "excluded."
+            : "A fault smaller than the threshold allows for, or one that does not show in this driving, is not "
+              "excluded: `wheelwright margins` says which faults this log would have shown."};
   }
   std::vector<std::string> out;
   const detector::Event& first =
@@ -113,8 +116,13 @@ std::vector<std::string> detect_words(const Detection& detection, const OnlineMo
                   "threshold allows.",
                   axis.text(worst.peak_time), output_name(model.model, worst.output), number(worst.peak_ratio)));
   out.emplace_back(
-      "Without a fault no parameter of the feasible set and no admissible noise explains this: a fault, an effect "
-      "that was absent when the robot was commissioned (payload, floor), or noise beyond its bounds.");
+      detection.residual == detector::Residual::d2
+          ? "A fault, an effect that was absent when the robot was commissioned (payload, floor), or a false alarm: "
+            "the "
+            "thresholds are constants by experiment, and nothing is proved. What the fault can be is not told by them."
+          : "Without a fault no parameter of the feasible set and no admissible noise explains this: a fault, an "
+            "effect "
+            "that was absent when the robot was commissioned (payload, floor), or noise beyond its bounds.");
   if (std::string text = first_isolation(isolations); !text.empty()) {
     out.push_back(std::move(text));
   }

@@ -98,6 +98,54 @@ TEST(KinematicJson, GivesTheDetectorBackBitForBit) {
   }
 }
 
+void expect_same_thresholds(const std::optional<detector::ConstantThresholds>& a,
+                            const std::optional<detector::ConstantThresholds>& b) {
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->block, b->block);
+  EXPECT_EQ(a->blocks, b->blocks);
+  EXPECT_EQ(a->learning, b->learning);
+  ASSERT_EQ(a->outputs.size(), b->outputs.size());
+  for (std::size_t i = 0; i < a->outputs.size(); ++i) {
+    EXPECT_EQ(a->outputs[i].value, b->outputs[i].value);
+    EXPECT_EQ(a->outputs[i].stated, b->outputs[i].stated);
+    EXPECT_EQ(a->outputs[i].held_out, b->outputs[i].held_out);
+    EXPECT_EQ(a->outputs[i].exceeded, b->outputs[i].exceeded);
+    EXPECT_EQ(a->outputs[i].chance, b->outputs[i].chance);
+  }
+}
+
+TEST(KinematicJson, GivesConstantThresholdsOfBothResidualsBack) {
+  Scenario s = posed_drive(3, 40.0);
+  s.robot.thresholds = {{"difference", 0.7}};
+  const Commissioning result = commissioned(s);
+  const OnlineModel back = there_and_back(result);
+  ASSERT_TRUE(result.model.kinematic && back.kinematic);
+  expect_same_thresholds(result.model.constant, back.constant);
+  expect_same_thresholds(result.model.kinematic->constant, back.kinematic->constant);
+  expect_same_thresholds(result.kinematic.model->constant, back.kinematic->constant);
+  EXPECT_EQ(back.robot.thresholds, s.robot.thresholds);
+  EXPECT_EQ(back.constant->outputs[1].value, 0.7);
+  EXPECT_TRUE(back.constant->outputs[1].stated);
+  EXPECT_FALSE(back.constant->outputs[0].stated);
+  EXPECT_GT(back.constant->outputs[0].value, 0.0);
+  // What it decides by is |ε| > μ_o, and D1 is what it was.
+  const LogTable log = sim::simulate(s);
+  TorqueDetector d1 = make_detector(back), d2 = make_detector(back, {.residual = detector::Residual::d2});
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    std::vector<double> sample;
+    for (const std::string& name : back.measurement.columns()) {
+      sample.push_back(log.column(name)[k]);
+    }
+    const Decision &one = d1.step(log.t[k], sample), &other = d2.step(log.t[k], sample);
+    for (std::size_t i = 0; one.valid && i < 2; ++i) {
+      const double size = std::abs(one.channels[i].residual), mu = back.constant->outputs[i].value;
+      ASSERT_EQ(other.channels[i].residual, one.channels[i].residual);
+      ASSERT_EQ(other.channels[i].dead_zone, size > mu ? size : 0.0);
+      ASSERT_EQ(other.channels[i].outside, size > mu);
+    }
+  }
+}
+
 TEST(KinematicJson, IsNotThereWithoutAPose) {
   Scenario s = posed_drive(3, 12.0);
   s.sensors.pose = false;
@@ -117,7 +165,7 @@ TEST(KinematicJson, SaysWhyThereIsNoModel) {
 }
 
 TEST(KinematicJson, RefusesWhatIsImpossible) {
-  const Commissioning result = commissioned(posed_drive(3, 12.0));
+  const Commissioning result = commissioned(posed_drive(3, 20.0));
   const Json good = to_json(result, {}, "test");
   const auto expect_refused = [&](const char* pointer, const Json& value, const char* word) {
     Json json = good;
@@ -137,6 +185,9 @@ TEST(KinematicJson, RefusesWhatIsImpossible) {
   expect_refused("/detector/estimate", Json::array({1.0}), "4 numbers");
   expect_refused("/measurement/motion", "steps", "mean_speed");
   expect_refused("/measurement/heading", false, "kinematic");
+  expect_refused("/detector/constant_thresholds/outputs/0/value", -0.1, "a number >= 0");
+  expect_refused("/detector/constant_thresholds/outputs/0/output", "yaw", "longitudinal");
+  expect_refused("/detector/constant_thresholds/outputs", Json::array(), "one threshold for each of the outputs");
   expect_refused("/feasible_set/hull/0", Json::array({2.0, 1.0}), "lower <= upper");
 }
 

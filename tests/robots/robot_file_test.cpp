@@ -36,6 +36,7 @@ heading_offset: -0.7
 pose_source: independent
 wheel_directions: checked
 limits:  {effort: 6.0, speed: 2}
+thresholds: {sum: 0.4, yaw: 0.01}
 motor: {torque_constant: 0.0105, resistance: 3.3, back_emf: 0.0105, gear_ratio: 9.69}
 parameters: [mass, yaw_inertia]
 )";
@@ -70,6 +71,7 @@ TEST(RobotFile, ReadsEveryKey) {
   EXPECT_EQ(robot.speed_filter,
             (model::SpeedFilter{.kind = model::SpeedFilterKind::mean, .time = {0.04, 0.05}, .found = true}));
   EXPECT_EQ(robot.speed_cut, (model::SpeedCut{.unit = 0.1, .down = true}));
+  EXPECT_EQ(robot.thresholds, (std::map<std::string, double>{{"sum", 0.4}, {"yaw", 0.01}}));
   EXPECT_EQ(robot.heading_offset, -0.7);
   EXPECT_TRUE(robot.wheel_directions_checked);
   ASSERT_TRUE(robot.clock);
@@ -234,6 +236,10 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"wheel_directions: forward", "wheel_directions: 'forward': expected one of unknown, checked"},
         Bad{"speed_source: encoder", "speed_source: 'encoder': expected one of auto, encoder_difference, measured"},
         Bad{"limits: {torque: 3}", "limits: unknown key 'torque': expected one of effort, speed, acceleration"},
+        Bad{"thresholds: 0.4", "thresholds: '0.4': expected keys with values, of sum, difference, longitudinal"},
+        Bad{"thresholds: {summ: 1}", "thresholds: unknown key 'summ'"},
+        Bad{"thresholds: {sum: 0}", "thresholds.sum: '0': expected a number > 0"},
+        Bad{"thresholds: {effort: 1}", "thresholds: unknown key 'effort'"},
         Bad{"footprint: {radius: 0}", "footprint.radius: '0': expected metres, > 0 and at most 100"},
         Bad{"footprint: {radius: 400}", "footprint.radius: '400': expected metres, > 0 and at most 100"},
         Bad{"footprint: 0.4", "footprint: '0.4': expected keys with values, of radius"},

@@ -49,6 +49,7 @@ TEST(RobotSchema, CoversWhatIsWritten) {
   robot.limits["effort"] = 1.0;
   robot.motor.emplace();
   robot.kinematic_window = 0.5;
+  robot.thresholds["sum"] = 0.2;
   robot.effects.push_back({"coulomb", {{"c", {0.1, 0.1}}}});
   const Json document = schema();
   const Json written = to_json(robot);
