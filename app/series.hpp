@@ -36,8 +36,8 @@ struct Series {
 
 /// Walks `log` through the detector of `model` and writes `path` (.csv, .mcap, .db3, .h5): for every instant that it
 /// decides the residual, its bounds l and u, ρ, and 0 or 1 for "outside" and "alarm", of each output; then |ε| outside
-/// and 0 inside the dead zone, d1_NAME of (35) where D1 decides and d2_NAME of (39) where the model has μ_o. Times of a bag
-/// get `origin` added (LogWriteOptions::time_origin). Throws InputError where it cannot be written.
+/// and 0 inside the dead zone, d1_NAME of (35) where D1 decides and d2_NAME of (39) where the model has μ_o. Times of a
+/// bag get `origin` added (LogWriteOptions::time_origin). Throws InputError where it cannot be written.
 Series write_series(const std::filesystem::path& path, LogSource& log, const OnlineModel& model,
                     const detector::DetectorOptions& options, double origin);
 /// The same of the kinematic residual.

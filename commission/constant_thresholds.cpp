@@ -270,9 +270,11 @@ std::string sentence(const detector::ConstantThresholds& thresholds) {
   }
   return fmt::format(
       "constant thresholds by experiment, without guarantee: {:.3g} s of driving like the healthy log's raise a false "
-      "alarm with a probability of at most {:.2g} % (the largest residuals of {} blocks); tried on {} blocks that were "
+      "alarm with a probability of at most {:.2g} %, one in {:.3g} s (the largest residuals of {} blocks); tried on {} "
+      "blocks that were "
       "held out, {} exceeded a threshold of the other {}{}",
-      thresholds.block, 100.0 * *chance, thresholds.blocks, most->held_out, most->exceeded, thresholds.learning,
+      thresholds.block, 100.0 * *chance, thresholds.block / *chance, thresholds.blocks, most->held_out, most->exceeded,
+      thresholds.learning,
       thresholds.refuted()
           ? ": more than that lets expect, the blocks of this log are not alike, and nothing is promised"
           : "");

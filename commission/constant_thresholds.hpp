@@ -27,10 +27,10 @@ struct ConstantThresholdOptions {
 
 /// Constant thresholds from fault-free `rows`, whose fit is `estimate` (θ̂), two walks.
 ///
-/// The instants are cut into blocks of equal number, no shorter than the memory of the filter. In each block |ε| is that
-/// of a fit without this block and its two neighbours: θ̂ less what their rows pulled it, θ̂ + A⁻¹ Σ Yᵀε/σ² over the rows
-/// that are left, A = Σ YᵀY/σ², centred to be 0 over all rows (so for least squares it is their exact fit). μ_o of an
-/// output is the largest |ε| of all blocks.
+/// The instants are cut into blocks of equal number, no shorter than the memory of the filter. In each block |ε| is
+/// that of a fit without this block and its two neighbours: θ̂ less what their rows pulled it, θ̂ + A⁻¹ Σ Yᵀε/σ² over
+/// the rows that are left, A = Σ YᵀY/σ², centred to be 0 over all rows (so for least squares it is their exact fit).
+/// μ_o of an output is the largest |ε| of all blocks.
 ///
 /// **What it promises** is the rank of a maximum: of n + 1 blocks that can be exchanged each is the largest with
 /// probability 1/(n + 1), whatever the distribution of ε. No more can be promised from n blocks without an assumption
@@ -47,8 +47,8 @@ struct ConstantThresholdOptions {
                                                                               const Eigen::VectorXd& estimate,
                                                                               const ConstantThresholdOptions& options);
 
-/// Of both residuals of `model`, which was commissioned from `log`: fills LearntSet::constant of each from the rows that
-/// its detector sees. Outputs that the robot file states keep their value.
+/// Of both residuals of `model`, which was commissioned from `log`: fills LearntSet::constant of each from the rows
+/// that its detector sees. Outputs that the robot file states keep their value.
 void learn_constant_thresholds(LogSource& log, OnlineModel& model);
 
 /// "constant thresholds by experiment, without guarantee: 2.4 s of driving like the log's raise a false alarm with a

@@ -243,6 +243,11 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
   const bool fault = !detection.events.empty() || kinematic_events > 0 || !at_risk.events.empty();
   content.status = fault ? "bad" : detection.instants == 0 || !undecided.empty() ? "caution" : "good";
   content.verdict = detect_verdict(detection, kinematic_events + at_risk.events.size(), !undecided.empty());
+  const bool d2 = detection.residual == detector::Residual::d2;
+  if (d2) {
+    content.sentences.emplace_back(
+        "Decided by the residual D2 with constant thresholds: without guarantee, and with false alarms now and then.");
+  }
   if (!undecided.empty()) {
     content.sentences.push_back(core::capital(undecided) + (undecided.ends_with('?') ? "" : "."));
   }
@@ -265,7 +270,6 @@ std::string detect_report(const Detection& detection, const OnlineModel& model, 
         core::capital(plural(kinematic_events, "event")), axis.text(first.alarm)));
   }
   content.software = context.software;
-  const bool d2 = detection.residual == detector::Residual::d2;
   if (!d2) {
     content.warrant = model.warrant;
   }

@@ -32,8 +32,10 @@ std::string contradicting(const Detection& detection, const OnlineModel& model) 
                       output_name(model.model, i));
     }
   }
-  return fmt::format("Of {} of driving, {} contradict the fault-free model.",
-                     with_unit(number(detection.seconds, 4), "s"), parts.empty() ? "0 s" : core::enumerated(parts));
+  return fmt::format("Of {} of driving, {} {}.", with_unit(number(detection.seconds, 4), "s"),
+                     parts.empty() ? "0 s" : core::enumerated(parts),
+                     detection.residual == detector::Residual::d2 ? "are outside the constant thresholds"
+                                                                  : "contradict the fault-free model");
 }
 
 // What the first event can be, in a sentence; empty where it was not asked.

@@ -134,6 +134,21 @@ class Detecting(unittest.TestCase):
         self.assertEqual([(e.start, e.alarm, e.output) for e in run.events],
                          [(e.start, e.alarm, e.output) for e in found.events])
 
+    def test_dead_zones_are_the_residuals_outside(self):
+        log, model = ww.read_log(fault_file(), robot()), commissioned().model
+        constant = commissioned().to_dict()["detector"]["constant_thresholds"]["outputs"]
+        mu = np.array([output["value"] for output in constant])
+        d1 = ww.Detector(model).run(log)
+        d2 = ww.Detector(model, residual="d2").run(log)
+        size = np.abs(d1.residual)
+        outside = (d1.residual < d1.lower) | (d1.residual > d1.upper)
+        np.testing.assert_array_equal(d1.dead_zone, np.where(outside, size, 0.0))
+        np.testing.assert_array_equal(d2.residual, d1.residual)
+        np.testing.assert_array_equal(d2.dead_zone, np.where(size > mu, size, 0.0))
+        self.assertGreater((d2.dead_zone > 0).sum(), (d1.dead_zone > 0).sum())
+        with self.assertRaises(ww.InvalidArgument):
+            ww.Detector(model, residual="d3")
+
     def test_no_theta_of_the_set_leaves_the_threshold(self):
         # The threshold bounds the residual for every theta of the set (34), and some theta attains it.
         model = commissioned().model

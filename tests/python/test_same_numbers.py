@@ -37,6 +37,12 @@ class SameNumbers(unittest.TestCase):
         self.same(python.to_dict(), program("detect", fault_file(), "--model", model_file(), "--set", "box", "--test",
                                             "symmetric", "--persistence", "2/3"))
 
+    def test_detect_by_constant_thresholds(self):
+        python = ww.detect(ww.read_log(fault_file(), robot()), ww.read_model(model_file()), residual="d2")
+        self.assertTrue(python.fault)
+        self.assertEqual([], python.incidents)
+        self.same(python.to_dict(), program("detect", fault_file(), "--model", model_file(), "--residual", "d2"))
+
     def test_identify(self):
         python = ww.identify(healthy_log(), robot(), shapes=False, seed=4)
         self.same(python.to_dict(), program("identify", HEALTHY, "--robot", ROBOT, "--no-shapes", "--seed", 4))
