@@ -10,7 +10,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "commission/constant_thresholds.hpp"
 #include "commission/physical.hpp"
 #include "formats/files/json.hpp"
 #include "formats/files/words.hpp"
@@ -43,13 +42,9 @@ Json constant_thresholds_json(const detector::ConstantThresholds& thresholds, co
                     {"exceeded", t.exceeded},
                     {"chance", t.chance}});
   }
-  return {{"block", thresholds.block},
-          {"blocks", thresholds.blocks},
-          {"learning", thresholds.learning},
-          {"false_alarms", files::or_null(thresholds.false_alarms())},
-          {"refuted", thresholds.refuted()},
-          {"outputs", std::move(list)},
-          {"sentence", commission::sentence(thresholds)}};
+  return {{"block", thresholds.block},       {"blocks", thresholds.blocks},
+          {"learning", thresholds.learning}, {"false_alarms", files::or_null(thresholds.false_alarms())},
+          {"refuted", thresholds.refuted()}, {"outputs", std::move(list)}};
 }
 
 Json candidates_json(const identify::EstimatorChoice& choice) {

@@ -39,7 +39,7 @@ except ImportError:
 
 import incidents
 import ordinary_world as world
-import wheelwright
+import wheelwright as ww
 
 SECONDS, LEARNT, WITHIN, BEFORE, ONSETS, MERGE = 420.0, 120.0, 5.0, 8.0, 6, 0.5  # s
 SIZES = 0.001 * np.sqrt(2.0)**np.arange(20)
@@ -48,7 +48,7 @@ FAULTS = {"effort_loss_left": "share of the effort lost", "effort_bias_right": "
 
 
 def log_of(columns):
-    return wheelwright.Log({name: np.ascontiguousarray(values) for name, values in columns.items()})
+    return ww.Log({name: np.ascontiguousarray(values) for name, values in columns.items()})
 
 
 def spoil(log, fault, size, onset):
@@ -75,7 +75,7 @@ def delays(model, columns, onset):
     """When D1 and D2 see something first behind the onset, s; infinite: not."""
     found = []
     for residual in ("d1", "d2"):
-        run = wheelwright.Detector(model, residual=residual).run(log_of(columns))
+        run = ww.Detector(model, residual=residual).run(log_of(columns))
         late = run.t[(run.dead_zone > 0).any(axis=1) & (run.t >= onset)]
         found.append(late[0] - onset if len(late) else np.inf)
     return found
@@ -84,8 +84,8 @@ def delays(model, columns, onset):
 def false_alarms(model, columns, thresholds):
     """Blocks with a residual of D2 outside, blocks, events, instants of D1 outside."""
     log = log_of(columns)
-    one = wheelwright.Detector(model).run(log)
-    two = wheelwright.Detector(model, residual="d2").run(log)
+    one = ww.Detector(model).run(log)
+    two = ww.Detector(model, residual="d2").run(log)
     outside = (two.dead_zone > 0).any(axis=1)
     length = int(round(thresholds["block"] / np.median(np.diff(two.t))))
     blocks = len(outside) // length
@@ -112,7 +112,7 @@ def main():
             learn = {name: values[log.columns["t"] < LEARNT] for name, values in log.columns.items()}
             with tempfile.TemporaryDirectory() as folder:
                 world.write_robot(Path(folder) / "robot.yaml", log.file | {"wheel_directions": "checked"})
-                done = wheelwright.commission(log_of(learn), wheelwright.read_robot(Path(folder) / "robot.yaml"))
+                done = ww.commission(log_of(learn), ww.read_robot(Path(folder) / "robot.yaml"))
             thresholds = done.to_dict().get("detector", {}).get("constant_thresholds")
             if done.status not in ("done", "partial") or not thresholds:
                 continue
