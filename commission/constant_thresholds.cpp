@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <Eigen/QR>
 
 #include "core/check.hpp"
 #include "detector/online_model.hpp"
