@@ -196,7 +196,7 @@ int run(const Arguments& a) {
   if (proves) {
     isolations = commission::isolate_events(log, model, detection, isolation);
     incidents = commission::join_events(log, model, detection, isolations, kinematic, isolation);
-    commission::add_sizes(log, model, incidents, isolation.isolation.threads);
+    commission::explain_courses(log, model, detection, kinematic, incidents, isolation.isolation.threads);
   }
   const bool asked =
       proves && (!detection.events.empty() || (kinematic.detection && !kinematic.detection->events.empty()));

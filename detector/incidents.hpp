@@ -20,12 +20,25 @@
 
 namespace wheelwright::detector {
 
+/// Courses of a fault's size over time, the narrowest class first.
+enum class CourseClass {
+  step,     ///< of one size from one onset on
+  growing,  ///< of one sign, its amount never falls
+  any       ///< any bounded one
+};
+
 /// A fault that may have caused the events of an incident that were examined.
 struct IncidentCandidate {
-  FaultFinding finding;    ///< size and onset that are left when these events are taken together
+  FaultFinding finding;    ///< size and onset that are left when these events are taken together; of a course that is no
+                           ///< step the size at the end, and an onset no later than the incident's start
   bool changes = false;    ///< it explains no more than the last events, or those with another size or onset
   std::size_t events = 1;  ///< examined ones that `finding` explains, all of them or the last; 0: not the last
   double since = 0.0;      ///< alarm of the first of these, s
+  CourseClass course = CourseClass::step;  ///< the narrowest class of courses that is not excluded
+  /// Cost of the best course less that of the likeliest candidate's (course_fit.hpp); nothing where it was not asked,
+  /// or is not known. `left`: what that course leaves, `guess`: its size at the end.
+  std::optional<double> behind{}, left{}, guess{};
+  bool as_likely = false;  ///< the data do not tell it from the first (less than 20 times as likely)
 };
 
 /// Events that one fault explains, or that came too soon one after the other to be told apart.
@@ -42,7 +55,8 @@ struct Incident {
   /// those that change by the number of events that they explain, then by the width of the size's interval relative to
   /// its middle. The order is no proof.
   std::vector<IncidentCandidate> candidates;
-  /// Sizes over time of faults that may have caused it, steps or not; empty where they were not asked for.
+  /// Sizes over time of faults that may have caused it, steps or not; empty where they were not asked for. Where they
+  /// were, candidates are of all courses (commission::explain_courses()), the likeliest first.
   std::vector<SizeOverTime> sizes{};
 };
 

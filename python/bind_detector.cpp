@@ -218,7 +218,8 @@ DetectionObject detect_in(LogObject& log, const ModelObject& given, const std::s
       isolation.isolation.threads = threads;
       out.isolations = commission::isolate_events(source, *model, out.detection, isolation);
       out.incidents = commission::join_events(source, *model, out.detection, out.isolations, out.kinematic, isolation);
-      commission::add_sizes(source, *model, out.incidents, isolation.isolation.threads);
+      commission::explain_courses(source, *model, out.detection, out.kinematic, out.incidents,
+                                  isolation.isolation.threads);
     }
     out.asked_other = proves && (!out.detection.events.empty() ||
                                  (out.kinematic.detection && !out.kinematic.detection->events.empty()));

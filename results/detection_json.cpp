@@ -98,6 +98,15 @@ Json size_json(const detector::SizeOverTime& size) {
           {"sentence", commission::sentence(size)}};
 }
 
+const char* course_name(detector::CourseClass course) {
+  switch (course) {
+    case detector::CourseClass::step: return "step";
+    case detector::CourseClass::growing: return "growing";
+    case detector::CourseClass::any: break;
+  }
+  return "any";
+}
+
 }  // namespace
 
 Json to_json(const detector::Incident& incident) {
@@ -107,6 +116,12 @@ Json to_json(const detector::Incident& incident) {
     entry["changes"] = candidate.changes;
     entry["events"] = candidate.events;
     entry["since"] = candidate.since;
+    entry["course"] = course_name(candidate.course);
+    const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); };
+    entry["behind"] = number(candidate.behind);
+    entry["left"] = number(candidate.left);
+    entry["guess"] = number(candidate.guess);
+    entry["as_likely"] = candidate.as_likely;
     entry["sentence"] = commission::sentence(candidate.finding);
     candidates.push_back(std::move(entry));
   }

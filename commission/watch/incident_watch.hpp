@@ -27,12 +27,21 @@ namespace wheelwright::commission {
                                                           const KinematicWatch& kinematic,
                                                           const EventIsolationOptions& options = {});
 
-/// Fills Incident::sizes of every incident that was isolated, from 3 s before it to 1 s behind its end, and up to
-/// 120 s after it began: what both residuals say of the size over time of each fault of the catalogue that
-/// has one, whether it was a step or not. Walks `log` once and holds these rows. Faults that no course of the size
-/// explains are left out, and so are those of which nothing is known.
-void add_sizes(LogSource& log, const OnlineModel& model, std::vector<detector::Incident>& incidents,
-               std::size_t threads = 1);
+/// What is left of incidents, of `detection` and `kinematic`, whose faults need not be steps. Walks `log` once and holds
+/// the rows from 3 s before to 1 s behind incidents that lie within 180 s.
+///
+/// - Incidents that one fault explains which only grows are joined.
+/// - Incident::sizes is filled: what both residuals say of the size over time of each fault of the catalogue that has
+///   one. Faults that no course of the size explains are left out, and so are those of which nothing is known.
+/// - Candidates are the faults that explain all of the incident as steps or as faults that grow; where there are none,
+///   or where it is likelier by far, those whose size rose and fell. **Of a step or a fault that only grows the true kind
+///   is never lost.** Effort readings and encoders that are said to stand still, and do not until the incident's end, are
+///   left out.
+/// - They are ordered by the cost of their best course (detector/faults/course_fit.hpp): an estimate, no proof. A reading
+///   that stands still for a second and more while the robot moves comes first.
+void explain_courses(LogSource& log, const OnlineModel& model, const Detection& detection,
+                     const KinematicWatch& kinematic, std::vector<detector::Incident>& incidents,
+                     std::size_t threads = 1);
 
 /// The columns of rows that isolations of `model` look at: those of the torque residual, and with `kinematic` of the
 /// kinematic one.

@@ -292,6 +292,36 @@ Isolation isolate_by_odometry(const OdometryReference& reference, const Model& m
   return isolation;
 }
 
+Eigen::MatrixXd odometry_responses(const OdometryReference& reference, const Model& model,
+                                   const filter::OdometryMeasurement& measurement,
+                                   const filter::OdometryErrors& errors, const FaultType& fault,
+                                   const Eigen::VectorXd& theta, const std::vector<std::size_t>& instants,
+                                   const std::vector<double>& times) {
+  const ReferenceMotion& motion = reference.motion;
+  const auto outputs = static_cast<Eigen::Index>(measurement.outputs().size());
+  if (!rows_are_known(fault) || motion.instants() < 4) {
+    return {};
+  }
+  OdometryOnsetRows rows(fault, model, measurement, errors, reference, 0, motion.instants());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(instants.size()) * outputs,
+                                              static_cast<Eigen::Index>(times.size()));
+  for (std::size_t c = 0; c < times.size(); ++c) {
+    const auto at = static_cast<std::size_t>(std::ranges::lower_bound(motion.t, times[c]) - motion.t.begin());
+    const std::size_t start = std::max<std::size_t>(at, 2);
+    if (start >= motion.instants()) {
+      continue;
+    }
+    rows.between(start - 2, start - 1);
+    for (std::size_t r = 0; r < instants.size(); ++r) {
+      for (Eigen::Index i = 0; i < outputs && instants[r] > start; ++i) {
+        const OnsetRow row = rows.row(instants[r], static_cast<std::size_t>(i));
+        out(static_cast<Eigen::Index>(r) * outputs + i, static_cast<Eigen::Index>(c)) = row.g1.dot(theta) + row.c;
+      }
+    }
+  }
+  return out;
+}
+
 void narrow_by(Isolation& isolation, const Isolation& other, double slack) {
   using Verdict = FaultFinding::Verdict;
   check::that(other.findings.size() == isolation.findings.size(), "other", "findings on the same faults");

@@ -20,7 +20,10 @@
 /// none of them).
 #pragma once
 
+#include <cstddef>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "detector/faults/isolation.hpp"
 #include "detector/faults/odometry_faults.hpp"
@@ -45,6 +48,14 @@ namespace wheelwright::detector {
                                             const filter::OdometryErrors& errors, double window,
                                             const bounds::Polytope& set, const std::vector<FaultType>& faults,
                                             double outside, double alarm, const IsolationOptions& options = {});
+
+/// What a step of size κ = 1 (κ' of an encoder) from each of `times` (s) on adds to the rows at `instants` with the
+/// parameters `theta`: instants × outputs, row by row, by times. Empty where the fault's rows are not known.
+[[nodiscard]] Eigen::MatrixXd odometry_responses(const OdometryReference& reference, const Model& model,
+                                                 const filter::OdometryMeasurement& measurement,
+                                                 const filter::OdometryErrors& errors, const FaultType& fault,
+                                                 const Eigen::VectorXd& theta, const std::vector<std::size_t>& instants,
+                                                 const std::vector<double>& times);
 
 /// Takes from `isolation` what `other`, of the other residual about the same alarm and of the same faults in the same
 /// order, does not leave: a fault that either excludes is excluded, and size and onset are what both leave (onsets to

@@ -13,13 +13,13 @@
 #include "detector/faults/fault_rows.hpp"
 #include "detector/faults/odometry_isolation.hpp"
 #include "detector/faults/onset_rows.hpp"
+#include "detector/faults/step_elements.hpp"
 #include "detector/threshold.hpp"
 #include "model/filter/odometry_filter.hpp"
 
 namespace wheelwright::detector {
 namespace {
 
-constexpr double kForgottenAfter = 20.0;  // 1/β: e^-20 of a weight is left, less than kRounded
 constexpr double kRounded = 1e-7;         // of all that is added in a sum: its rounding, and what is forgotten
 constexpr std::size_t kInstants = 200;    // of SizeOverTime::growing
 constexpr std::array<double, 5> kEarlier = {1.0, 2.0, 3.5, 5.0, 8.0};  // 1/β before a row: T0
@@ -83,8 +83,9 @@ void take_sides(const FaultType& fault, SizeEvidence& out) {
   }
 }
 
-// Up to `most` instants in the window at which a row is, evenly spread.
-std::vector<std::size_t> rows_within(const ReferenceMotion& motion, const Interval& window, std::size_t most) {
+// Up to `most` instants in the window at which a row is, evenly spread, and those next to the times `also`.
+std::vector<std::size_t> rows_within(const ReferenceMotion& motion, const Interval& window, std::size_t most,
+                                     const std::vector<double>& also) {
   std::vector<std::size_t> all, out;
   for (std::size_t k = 0; k < motion.instants(); ++k) {
     if (motion.settled[k] && window.contains(motion.t[k])) {
@@ -95,6 +96,14 @@ std::vector<std::size_t> rows_within(const ReferenceMotion& motion, const Interv
   for (std::size_t k = 0; k < count; ++k) {
     out.push_back(all[count > 1 ? k * (all.size() - 1) / (count - 1) : 0]);
   }
+  for (const double t : also) {
+    const auto at = std::ranges::lower_bound(all, t, {}, [&](std::size_t k) { return motion.t[k]; });
+    if (at != all.end() && window.contains(t)) {
+      out.push_back(*at);
+    }
+  }
+  std::ranges::sort(out);
+  out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;
 }
 
@@ -106,64 +115,6 @@ Interval left_of_row(const ThresholdRule& rule, const RegressionBlock& rows, std
   return core::point(rows.y[at]) - Interval{threshold.lower, threshold.upper};
 }
 
-// Weights of the elements of a motion in its rows, one row after the other.
-class RowWeights {
- public:
-  RowWeights(const ReferenceMotion& motion, const FilterDesign& design)
-      : motion_(motion), design_(design), kernel_(design, motion.kind, motion.nominal_step) {
-    if (!motion.cuts.empty()) {
-      kernel_.soften();
-    }
-  }
-
-  // Elements [first(), row) with weights weight(k), of the row at instant `row`.
-  void of(std::size_t row) {
-    const auto next = std::upper_bound(motion_.segment_starts.begin(), motion_.segment_starts.end(), row);
-    const std::size_t segment = next == motion_.segment_starts.begin() ? 0 : *(next - 1);
-    first_ = row;
-    while (first_ > segment && motion_.instant[row] - motion_.instant[first_] < kForgottenAfter / design_.beta) {
-      --first_;
-    }
-    weights_.assign(row - first_, 0.0);
-    std::optional<std::size_t> cut;
-    for (std::size_t k = row; k-- > first_;) {
-      double weight = of_age(k, row, k);
-      if (cut) {
-        weight -= std::exp(-kernel_.lambda() * (motion_.instant[*cut] - motion_.instant[k])) * of_age(k, row, *cut);
-      }
-      weights_[k - first_] = motion_.held(k) * weight;
-      if (motion_.cut_at(k)) {
-        cut = k;
-      }
-    }
-  }
-  [[nodiscard]] std::size_t first() const { return first_; }
-  [[nodiscard]] double weight(std::size_t k) const { return weights_[k - first_]; }
-
- private:
-  // Of an element like `k` that came at instant `since`.
-  [[nodiscard]] double of_age(std::size_t k, std::size_t row, std::size_t since) {
-    const double beta = design_.beta, gain = kernel_.gain();
-    if (kernel_.nodes()) {
-      const double x = motion_.instant[row] - motion_.instant[since], decay = std::exp(-beta * x);
-      if (design_.order == 1) {
-        return gain * decay;
-      }
-      const double fast = kernel_.apart() > 0.0 ? std::exp(-kernel_.gamma() * x) : decay;
-      return gain * kernel_.slow() * (x * decay - kernel_.apart() * (decay - fast));
-    }
-    const filter::StepWeights step(beta, motion_.step[k + 1]);
-    const double x = motion_.instant[row] - motion_.instant[k + 1], decay = std::exp(-beta * x);
-    return gain * decay * (design_.order == 1 ? step.increment1() : step.increment2() + x * step.increment1());
-  }
-
-  const ReferenceMotion& motion_;
-  FilterDesign design_;
-  filter::FilterKernel kernel_;
-  std::size_t first_ = 0;
-  std::vector<double> weights_;
-};
-
 // What all faults of the torque residual share.
 struct TorqueRows {
   const ReferenceMotion& motion;
@@ -174,79 +125,6 @@ struct TorqueRows {
   std::vector<Interval> left;  // E, row by row, output by output
   double most_effort = 0.0;    // of a bias that is spoken of
 };
-
-// A signature along the motion of a fault that was there before, element by element, output by output.
-struct Elements {
-  std::size_t outputs = 0, columns = 0;
-  std::vector<double> g1, g2;  // of the element from instant k to the next, integrated; instants × outputs × columns
-  std::vector<double> c;       // alike; instants × outputs
-  std::vector<double> once, twice;  // impulse of the motion beyond v at instant k, in g1 and g2
-
-  [[nodiscard]] const double* at(const std::vector<double>& of, std::size_t k, std::size_t i) const {
-    return of.data() + (k * outputs + i) * columns;
-  }
-};
-
-Elements elements_of(const FaultType& fault, const TorqueRows& in) {
-  const ReferenceMotion& motion = in.motion;
-  const Model& model = in.filter.model();
-  const auto n = static_cast<Eigen::Index>(model.n());
-  Elements out;
-  out.outputs = model.n();
-  out.columns = model.p();
-  const std::size_t size = out.outputs * out.columns;
-  for (std::vector<double>* part : {&out.g1, &out.g2, &out.once, &out.twice}) {
-    part->assign(motion.instants() * size, 0.0);
-  }
-  out.c.assign(motion.instants() * out.outputs, 0.0);
-  FaultElements elements(fault, model, in.filter.design().static_gain(), motion);
-  for (const std::size_t start : motion.segment_starts) {
-    elements.begin_broken(start);
-    while (elements.next()) {
-      const std::array<double, 2>& share = elements.shares();
-      const FaultSignals &a = elements.at_begin(), &b = elements.at_end();
-      const std::size_t k = elements.instant() - 1;
-      for (std::size_t e = 0; e < size; ++e) {
-        out.g1[k * size + e] = share[0] * a.g1.data()[e] + share[1] * b.g1.data()[e];
-        out.g2[k * size + e] = share[0] * a.g2.data()[e] + share[1] * b.g2.data()[e];
-      }
-      for (std::size_t i = 0; i < out.outputs; ++i) {
-        const auto at = static_cast<Eigen::Index>(i);
-        out.c[k * out.outputs + i] = share[0] * a.c[at] + share[1] * b.c[at];
-      }
-    }
-  }
-  if (fault.motion.size() == 0 && fault.slip.size() == 0) {
-    return out;
-  }
-  Eigen::MatrixXd gain = Eigen::MatrixXd::Zero(n, n);
-  for (const Eigen::MatrixXd* part : {&fault.effort, &fault.ground}) {
-    if (part->size() > 0) {
-      gain += *part;
-    }
-  }
-  for (std::size_t k = 0; k < motion.instants(); ++k) {
-    Eigen::VectorXd moved = Eigen::VectorXd::Zero(motion.speed.rows());
-    if (fault.motion.size() > 0) {
-      moved += fault.motion * motion.speed.col(static_cast<Eigen::Index>(k));
-    }
-    if (fault.slip.size() > 0) {
-      moved += fault.slip;
-    }
-    for (const Term& term : model.terms) {
-      if (term.kind == Term::Kind::acceleration) {
-        const double impulse = term.scale * moved[static_cast<Eigen::Index>(term.coordinate)];
-        out.once[k * size + term.output * out.columns + term.parameter] += impulse;
-        for (std::size_t i = 0; i < out.outputs; ++i) {
-          // κ d(κu)/dt = d(κ²u)/dt − (κ²)˙u/2
-          out.twice[k * size + i * out.columns + term.parameter] +=
-              0.5 * gain(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(term.output)) * impulse;
-        }
-      }
-    }
-  }
-  return out;
-}
 
 // Σ θ_j a_j over a box of θ, a_j in [low_j, high_j].
 struct Product {
@@ -263,7 +141,7 @@ class StepResponses {
  public:
   StepResponses(const FaultType& fault, const TorqueRows& in)
       : in_(in),
-        elements_(elements_of(fault, in)),
+        elements_(step_elements(fault, in.filter.model(), in.filter.design().static_gain(), in.motion)),
         errors_(fault, in.filter.model(), in.filter.design(), in.motion),
         offset_(fault.offset.size() > 0 ? fault.offset.cwiseAbs().maxCoeff() : 0.0) {
     // At an onset the errors of the shortest step's speed count.
@@ -417,7 +295,7 @@ class StepResponses {
 
  private:
   const TorqueRows& in_;
-  Elements elements_;
+  StepElements elements_;
   SignatureErrors errors_;
   double offset_;
   bool square_ = false;                         // has_square()
@@ -603,7 +481,7 @@ std::vector<SizeEvidence> size_evidence(const ReferenceMotion& motion, const Reg
                   static_cast<std::size_t>(efforts.cols()) == motion.instants(),
               "efforts", "joints × instants");
   std::vector<SizeEvidence> out(faults.size());
-  TorqueRows in{motion, filter, efforts, set, rows_within(motion, window, options.most_rows), {}, motion.most_effort};
+  TorqueRows in{motion, filter, efforts, set, rows_within(motion, window, options.most_rows, options.also), {}, motion.most_effort};
   if (in.most_effort <= 0.0) {
     in.most_effort = core::kInfinity;
   }
@@ -857,7 +735,7 @@ std::vector<SizeEvidence> size_evidence_by_odometry(const OdometryReference& ref
                                                     const SizeOptions& options) {
   const ReferenceMotion& motion = reference.motion;
   check::that(set.dimension() == motion.rows.parameters, "set", "as many parameters as the rows");
-  OdometryRows in{reference, model, measurement, errors, set, rows_within(motion, window, options.most_rows), {}};
+  OdometryRows in{reference, model, measurement, errors, set, rows_within(motion, window, options.most_rows, options.also), {}};
   const ThresholdRule rule(set, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(set.dimension())));
   bool healthy = true;
   for (const std::size_t row : in.rows) {

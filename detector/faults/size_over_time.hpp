@@ -88,6 +88,7 @@ struct SizeEvidence {
 /// Options of the evidence.
 struct SizeOptions {
   std::size_t most_rows = 240;  ///< whose rows are used, evenly spread over the window
+  std::vector<double> also{};   ///< s: rows next to these times are used, too
   std::size_t threads = 1;      ///< the result does not depend on it
 };
 

@@ -171,14 +171,35 @@ std::string only_as_growing(const detector::Incident& incident) {
                      names.size() > shown ? fmt::format("; and {} more", names.size() - shown) : "");
 }
 
+// A fault that may have caused an incident, by the course that it has to have.
+std::string candidate_words(const detector::IncidentCandidate& candidate, bool stays) {
+  using detector::CourseClass;
+  const model::FaultType& fault = candidate.finding.fault;
+  std::string text;
+  switch (candidate.course) {
+    case CourseClass::step:
+      text = commission::sentence(candidate.finding) +
+             (candidate.changes && stays ? " (its size changes: that of the last event)" : "");
+      break;
+    case CourseClass::growing: text = fault.sentence + ", a fault that grew"; break;
+    case CourseClass::any: text = fault.sentence + ", a fault whose size rose and fell"; break;
+  }
+  if (candidate.guess && !fault.whole) {
+    const bool share = fault.unit == "1";
+    text += fmt::format(", best fit at the end {:.3g} {}", (share ? 100.0 : 1.0) * *candidate.guess,
+                        share ? "%" : fault.unit);
+  }
+  return text;
+}
+
+constexpr double kFitsBadly = 0.5;  // of the deviation, left by the best course
+
 }  // namespace
 
 std::string incident_sentence(const detector::Incident& incident) {
-  constexpr std::size_t most = kMostOthers;
   std::vector<std::string> faults;
   for (const detector::IncidentCandidate& candidate : incident.candidates) {
-    faults.push_back(commission::sentence(candidate.finding) +
-                     (candidate.changes && incident.stays ? " (its size changes: that of the last event)" : ""));
+    faults.push_back(candidate_words(candidate, incident.stays));
   }
   std::string text;
   if (faults.empty()) {
@@ -188,23 +209,40 @@ std::string incident_sentence(const detector::Incident& incident) {
                                                          "this: several faults, or one that grows";
     text += fmt::format(", since {:.2f} s", incident.start);
   } else {
-    const std::size_t shown = std::min(faults.size(), most + 1);
+    const detector::IncidentCandidate& first = incident.candidates.front();
+    const bool told = first.left || first.course != detector::CourseClass::step;
     const bool none_at_risk = std::ranges::all_of(incident.candidates, [](const detector::IncidentCandidate& c) {
       return c.finding.at_risk && c.finding.at_risk->excluded;
     });
-    text = (!incident.stays ? fmt::format("no one fault that stays explains all of this: several faults, or one that "
-                                          "grows; from the event at {:.2f} s on it may be: ",
-                                          incident.candidates.front().since)
-            : none_at_risk  ? "at the stated risk no fault that was examined, each as one that stays; for certain not "
-                              "excluded: "
-                            : "") +
-           faults.front() + any_course(incident);
-    if (shown > 1) {
-      text += fmt::format("; {}{}", none_at_risk && incident.stays ? "" : "also possible: ",
-                          fmt::join(faults.begin() + 1, faults.begin() + shown, "; "));
+    const auto alike = static_cast<std::size_t>(
+        std::ranges::count(incident.candidates, true, &detector::IncidentCandidate::as_likely));
+    text = told && first.left.value_or(0.0) > kFitsBadly
+               ? "no fault of the catalogue fits this well: another load or ground (compare with the log that the model "
+                 "was learnt on by `wheelwright gap`), several faults, or one that it lacks; the nearest: "
+           : !told && !incident.stays
+               ? fmt::format("no one fault that stays explains all of this: several faults, or one that grows; from the "
+                             "event at {:.2f} s on it may be: ",
+                             first.since)
+           : none_at_risk ? "at the stated risk no fault that was examined, each as one that stays; for certain not "
+                            "excluded: "
+                          : "";
+    text += faults.front() + any_course(incident);
+    const auto list = [&](std::size_t from, std::size_t to) {
+      const std::size_t shown = std::min(to, from + kMostOthers);
+      text += fmt::format("{}{}",
+                          fmt::join(faults.begin() + static_cast<std::ptrdiff_t>(from),
+                                    faults.begin() + static_cast<std::ptrdiff_t>(shown), "; "),
+                          to > shown ? fmt::format("; and {} more", to - shown) : "");
+    };
+    if (alike > 0) {
+      text += "; this log does not tell it from: ";
+      list(1, 1 + alike);
     }
-    if (faults.size() > shown) {
-      text += fmt::format("; and {} more", faults.size() - shown);
+    if (faults.size() > 1 + alike) {
+      text += told                             ? "; less likely, not excluded: "
+              : none_at_risk && incident.stays ? "; "
+                                               : "; also possible: ";
+      list(1 + alike, faults.size());
     }
   }
   text += only_as_growing(incident);

@@ -15,6 +15,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 TABLE = 0.005  # s between entries of a reference
+# What may change over time, with the value that changes nothing: factors on radii, on what a wheel rolls of its way
+# (the rest slips), on mass, viscous friction of both kinds, N m of dry friction more at a wheel, and slip of the whole
+# robot: m/s along its heading and to its left, rad/s about the vertical.
+COURSES = {"radius_right": 1.0, "radius_left": 1.0, "rolls_right": 1.0, "rolls_left": 1.0, "mass": 1.0, "friction": 1.0,
+           "brake_right": 0.0, "brake_left": 0.0, "along": 0.0, "across": 0.0, "about": 0.0}
 SIDES = ("r", "l")
 
 
@@ -39,7 +44,7 @@ class Robot:
     heavier: float = 1.0  # factor on the mass from the middle of the log on
     worn: float = 1.0  # factor on the radius of the left wheel
     worn_late: float = 1.0  # another one, from the middle of the log on
-    course: np.ndarray = None  # another one, every TABLE s
+    courses: dict = field(default_factory=dict)  # what changes over time, every TABLE s, by a name of COURSES
     phase: float = 0.0
     top: float = 0.0  # m/s that is meant to be reached
     fine: int = 0  # integration steps a sample
@@ -128,22 +133,28 @@ def simulate(robots):
     period = np.where([r.hold == "linear" for r in robots], 1, of["fine"])
     phase = np.where([r.hold == "between" for r in robots], np.round(of["fine"] * [r.phase for r in robots]), 0)
 
-    def coefficients(mass):
+    def coefficients(mass, friction=1.0):
         """Decay of both speeds over a step, and their change by a unit of force or moment."""
-        d_v, d_w = np.exp(-of["viscous"] * h / mass), np.exp(-of["viscous_yaw"] * h / of["inertia"])
-        return d_v, d_w, (1 - d_v) / of["viscous"], (1 - d_w) / of["viscous_yaw"]
+        b, b_yaw = friction * of["viscous"], friction * of["viscous_yaw"]
+        d_v, d_w = np.exp(-b * h / mass), np.exp(-b_yaw * h / of["inertia"])
+        return d_v, d_w, (1 - d_v) / b, (1 - d_w) / b_yaw
 
     d_v, d_w, g_v, g_w = coefficients(of["mass"])
     radii, half = of["radius"] * np.array([np.ones(many), of["worn"]]), of["track"] / 2
-    courses = any(r.course is not None for r in robots)
-    course = np.ones((size, many))
-    for i, r in enumerate(robots):
-        if r.course is not None:
-            course[:, i] = np.interp(np.arange(size), np.arange(len(r.course)), r.course)
+    courses = {name: np.array([table_of(r, name, size) for r in robots]).T for name in COURSES
+               if any(name in r.courses for r in robots)}
+    now_of = dict(COURSES)
     record = np.empty((last.max(), 6, many))
     v, w = np.zeros(many), np.zeros(many)
     angle, sum_e, u = np.zeros((2, many)), np.zeros((2, many)), np.zeros((2, many))
-    limit, dry = of["coulomb"] / radii, bool(of["coulomb"].any())
+    limit = of["coulomb"] / radii
+    dry = bool(of["coulomb"].any()) or not {"brake_right", "brake_left"}.isdisjoint(courses)
+    rolls, along, about = np.ones((2, many)), 0.0, 0.0
+
+    def turning():
+        """Speeds of the wheels."""
+        return np.array([v - along + half * (w - about), v - along - half * (w - about)]) / (radii * rolls)
+
     omega = np.zeros((2, many))
     halves = last // 2
     for k in range(last.max()):
@@ -152,15 +163,25 @@ def simulate(robots):
             d_v, d_w, g_v, g_w = coefficients(np.where(now, of["mass"] * of["heavier"], of["mass"]))
             radii = of["radius"] * np.array([np.ones(many), of["worn"] * np.where(now, of["worn_late"], 1.0)])
             limit = of["coulomb"] / radii
-            omega = np.array([v + half * w, v - half * w]) / radii
+            omega = turning()
         if courses:
             at = np.minimum(k * h / TABLE, size - 1.001)
             i, part = at.astype(int), at % 1.0
-            now = (1 - part) * course[i, each] + part * course[i + 1, each]
+            now_of.update({name: (1 - part) * table[i, each] + part * table[i + 1, each]
+                           for name, table in courses.items()})
             late = np.where(k >= halves, of["worn_late"], 1.0)
-            radii = of["radius"] * np.array([np.ones(many), of["worn"] * late * now])
-            limit = of["coulomb"] / radii
-            omega = np.array([v + half * w, v - half * w]) / radii
+            radii = of["radius"] * np.array([now_of["radius_right"] * np.ones(many),
+                                             of["worn"] * late * now_of["radius_left"]])
+            rolls = np.array([now_of["rolls_right"] * np.ones(many), now_of["rolls_left"] * np.ones(many)])
+            along, about = now_of["along"], now_of["about"]
+            limit = (of["coulomb"] + np.array([now_of["brake_right"] * np.ones(many),
+                                               now_of["brake_left"] * np.ones(many)])) / radii
+            if "mass" in courses or "friction" in courses:
+                heavier = np.where(k >= halves, of["heavier"], 1.0)
+                d_v, d_w, g_v, g_w = coefficients(of["mass"] * heavier * now_of["mass"], now_of["friction"])
+            if "across" in courses:  # the body turns under what slips to its left
+                v = v + h * w * now_of["across"]
+            omega = turning()
         due = (k + phase) % period == 0
         if due.any():
             at = np.minimum(k * h / TABLE + 1e-6, size - 1.001)
@@ -174,7 +195,7 @@ def simulate(robots):
         w = d_w * w + g_w * half * (push[0] - push[1])
         if dry:
             own, other = g_v + g_w * half * half, g_v - g_w * half * half
-            free = np.array([v + half * w, v - half * w])
+            free = np.array([v - along + half * (w - about), v - along - half * (w - about)])
             grip = (own * free - other * free[::-1]) / (own * own - other * other)  # if both wheels stick
             grip = np.clip(grip, -limit, limit)
             for _ in range(3):
@@ -182,7 +203,7 @@ def simulate(robots):
                     grip[a] = np.clip((free[a] - other * grip[b]) / own, -limit[a], limit[a])
             v = v - g_v * (grip[0] + grip[1])
             w = w - g_w * half * (grip[0] - grip[1])
-        new = np.array([v + half * w, v - half * w]) / radii
+        new = turning()
         angle = angle + h / 2 * (omega + new)
         omega = new
     linear = np.array([r.hold == "linear" for r in robots])
@@ -192,18 +213,30 @@ def simulate(robots):
             for i in range(many)]
 
 
+def table_of(robot, name, size):
+    """A course of a robot as `size` entries, its last one from its end on."""
+    table = robot.courses.get(name, np.array([COURSES[name]]))
+    return table[np.minimum(np.arange(size), len(table) - 1)]
+
+
 def body(true, robot):
     """x, y (m), theta (rad), yaw rate (rad/s) of the true motion."""
-    late = np.arange(len(true["t"])) >= len(true["t"]) // 2
-    worn = robot.worn * np.where(late, robot.worn_late, 1.0)
-    if robot.course is not None:
-        worn = worn * np.interp(true["t"], TABLE * np.arange(len(robot.course)), robot.course)
-    left = np.cumsum(np.diff(true["phi_l"], prepend=0.0) * np.roll(worn, 1))
-    theta = (true["phi_r"] - left) * robot.radius / robot.track
-    way = (true["phi_r"] + left) * robot.radius / 2
+    t = true["t"]
+    course = lambda name: (np.interp(t, TABLE * np.arange(len(robot.courses[name])), robot.courses[name])
+                           if name in robot.courses else COURSES[name] + 0 * t)
+    late = np.arange(len(t)) >= len(t) // 2
+    right = course("radius_right") * course("rolls_right")
+    left = robot.worn * np.where(late, robot.worn_late, 1.0) * course("radius_left") * course("rolls_left")
+    h = np.diff(t, prepend=t[0])
+    rolled = {side: np.cumsum(np.diff(true["phi_" + side[0]], prepend=0.0) * np.roll(factor, 1)) * robot.radius
+              for side, factor in (("right", right), ("left", left))}
+    theta = (rolled["right"] - rolled["left"]) / robot.track + np.cumsum(course("about") * h)
+    way = (rolled["right"] + rolled["left"]) / 2 + np.cumsum(course("along") * h)
     step, mean = np.diff(way, prepend=way[0]), theta - np.diff(theta, prepend=theta[0]) / 2
-    return {"x": np.cumsum(step * np.cos(mean)), "y": np.cumsum(step * np.sin(mean)), "theta": theta,
-            "gyro_z": (true["omega_r"] - worn * true["omega_l"]) * robot.radius / robot.track}
+    aside = course("across") * h
+    return {"x": np.cumsum(step * np.cos(mean) - aside * np.sin(mean)),
+            "y": np.cumsum(step * np.sin(mean) + aside * np.cos(mean)), "theta": theta,
+            "gyro_z": (right * true["omega_r"] - left * true["omega_l"]) * robot.radius / robot.track + course("about")}
 
 
 def low_pass(x, step, tau):

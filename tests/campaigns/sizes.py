@@ -37,35 +37,13 @@ except ImportError:
 
 import incidents
 import ordinary_world as world
+from incidents import COURSES, FALLING, LEARNT, SECONDS, WATCHED
 
-SECONDS, LEARNT, WATCHED, ONSET = 100.0, 50.0, 40.0, 60.0  # s
 SIZES = {"effort_loss_left": 0.35, "effort_bias_right": 0.5, "encoder_scale_left": -0.12, "wheel_radius_left": -0.15}
 
 
-def ramp(rise):
-    return lambda t, g: np.clip((t - ONSET) / rise, 0, 1)
-
-
-def smooth(rise):
-    return lambda t, g: 0.5 * (1 - np.cos(np.pi * np.clip((t - ONSET) / rise, 0, 1)))
-
-
-def wandering(t, g):
-    """Anything within the range: knots of random heights, some of them jumps."""
-    at = ONSET + np.cumsum(g.uniform(0.2, 4.0, 40))
-    return np.where(t < ONSET, 0.0, np.interp(t, at, g.uniform(0, 1, 40) * (g.uniform(size=40) < 0.8)))
-
-
-COURSES = {
-    "step": lambda t, g: (t >= ONSET) * 1.0,
-    "ramp_0.5": ramp(0.5), "ramp_2": ramp(2.0), "ramp_5": ramp(5.0), "ramp_20": ramp(20.0),
-    "smooth_2": smooth(2.0), "smooth_10": smooth(10.0),
-    "stairs": lambda t, g: np.clip(np.floor((t - ONSET) / 3.0 + 1.0) / 4, 0, 1),
-    "creeping": lambda t, g: np.clip((t - 20.0) / 60.0, 0, 1),
-    "pulse": lambda t, g: ((t >= ONSET) & (t < ONSET + 4.0)) * 1.0,
-    "wandering": wandering,
-}
-FALLING = ("pulse", "wandering")
+def sensors_of(seed):
+    return "pose" if seed % 2 == 0 else "none"
 
 
 def spoil(log, fault, course, scale):
@@ -175,7 +153,8 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
-    run = lambda *words: subprocess.run([options.program, *map(str, words)], capture_output=True, text=True, check=False)
+    run = lambda *words: subprocess.run([options.program, *map(str, words)], capture_output=True, text=True,
+                                        check=False)
     seeds = list(range(options.seed, options.seed + options.robots))
     robots = [world.draw_robot(np.random.default_rng([seed, 5]), (50, 100), (SECONDS, SECONDS), "speed", "at_samples")
               for seed in seeds]
@@ -185,7 +164,8 @@ def main():
         for name in options.courses if "wheel_radius_left" in options.kinds else []:
             t = world.TABLE * np.arange(int(SECONDS / world.TABLE) + 3)
             which[at, name] = len(worn)
-            worn.append(dataclasses.replace(robot, course=1 + SIZES["wheel_radius_left"] * of(name, seed)(t)))
+            radius = 1 + SIZES["wheel_radius_left"] * of(name, seed)(t)
+            worn.append(dataclasses.replace(robot, courses={"radius_left": radius}))
     healthy = world.simulate([dataclasses.replace(r) for r in robots])
     drives = world.simulate(worn) if worn else []
     world.refine(robots)
@@ -198,7 +178,7 @@ def main():
         for at, (seed, robot) in enumerate(zip(seeds, robots)):
             folder = base / str(seed)
             folder.mkdir(parents=True, exist_ok=True)
-            learn = incidents.make_log(robot, healthy[at], seed, seed % 2 == 0, 0.0)
+            learn = incidents.make_log(robot, healthy[at], seed, sensors_of(seed), 0.0)
             learn.keep(learn.columns["t"] < LEARNT)
             world.write_csv(folder / "learn.csv", learn.columns)
             world.write_robot(folder / "robot.yaml", learn.file | {"wheel_directions": "checked"})
@@ -217,7 +197,7 @@ def main():
                         own = worn[which[at, name]] if fault == "wheel_radius_left" else robot
                         own.fine = robot.fine
                         true = drives[which[at, name]] if fault == "wheel_radius_left" else healthy[at]
-                        log = incidents.make_log(own, true, seed + 1000, seed % 2 == 0, lost)
+                        log = incidents.make_log(own, true, seed + 1000, sensors_of(seed), lost)
                         scale = SIZES[fault]
                         if fault == "effort_bias_right":
                             scale *= float(np.sqrt(np.mean(true["tau_r"]**2)))
