@@ -29,9 +29,9 @@ enum class CourseClass {
 
 /// A fault that may have caused the events of an incident that were examined.
 struct IncidentCandidate {
-  FaultFinding finding;    ///< size and onset that are left when these events are taken together; of a course that is no
-                           ///< step the size at the end, and an onset no later than the incident's start
-  bool changes = false;    ///< it explains no more than the last events, or those with another size or onset
+  FaultFinding finding;  ///< size and onset that are left when these events are taken together; of a course that is no
+                         ///< step the size at the end, and an onset no later than the incident's start
+  bool changes = false;  ///< it explains no more than the last events, or those with another size or onset
   std::size_t events = 1;  ///< examined ones that `finding` explains, all of them or the last; 0: not the last
   double since = 0.0;      ///< alarm of the first of these, s
   CourseClass course = CourseClass::step;  ///< the narrowest class of courses that is not excluded

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -29,6 +30,7 @@ constexpr double kFitted = 60.0;                                  // s of an inc
 constexpr double kMostOfIt = 0.9;                                 // of the largest amount that is certain
 constexpr double kLikelier = 3.0;                                 // 20 times as likely
 constexpr double kStill = 1.0;                                    // s
+constexpr double kSlowly = 1.0;                                   // s: what takes longer to come is told as growing
 constexpr std::size_t kMostMoments = 60, kMostTries = 8, kRows = 240;
 
 // Rows of a log with times in [from, to].
@@ -158,7 +160,8 @@ std::vector<double> moments_of(const Detection& detection, const KinematicWatch&
 
 // At most so many of `moments` within the window, evenly spread.
 std::vector<double> some_within(const std::vector<double>& moments, const Interval& window) {
-  const auto first = std::ranges::lower_bound(moments, window.lower), last = std::ranges::upper_bound(moments, window.upper);
+  const auto first = std::ranges::lower_bound(moments, window.lower),
+             last = std::ranges::upper_bound(moments, window.upper);
   const auto all = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, last - first));
   const std::size_t count = std::min(kMostMoments, all);
   std::vector<double> out;
@@ -263,17 +266,39 @@ std::optional<double> stands_still(const Reading& in, const Incident& incident, 
     others = {std::min(others.lower, other), std::max(others.upper, other)};
   }
   const double slack = 2.0 * noise + 1e-6 * largest;
-  const bool still =
-      !any || (fault.held_effort || encoder ? held.width() <= slack : core::magnitude(held) <= slack);
+  const bool still = !any || (fault.held_effort || encoder ? held.width() <= slack : core::magnitude(held) <= slack);
   if (!still) {
     return -1.0;
   }
   return others.width() > 0.0 ? to - from : 0.0;
 }
 
+// Takes a class for a step that it is proved not to be, or whose best course takes long to come.
+void widen_course(const Incident& incident, const detector::CourseFit& fit, double before,
+                  IncidentCandidate& candidate) {
+  const auto size = std::ranges::find(incident.sizes, candidate.finding.fault.name,
+                                      [](const detector::SizeOverTime& s) { return s.fault.name; });
+  if (candidate.course != CourseClass::step || size == incident.sizes.end()) {
+    return;
+  }
+  if (size->growing_excluded) {
+    candidate.course = CourseClass::any;
+    candidate.finding.magnitude = size->fault.range;
+  } else if (fit.known && fit.grows && fit.rise > kSlowly && !size->growing.empty()) {
+    candidate.course = CourseClass::growing;
+    candidate.finding.magnitude = size->growing.back().size;
+  } else {
+    return;
+  }
+  candidate.finding.onset = {before, incident.start};
+  candidate.finding.earlier = true;
+  candidate.finding.at_risk.reset();
+}
+
 // The likeliest first, by how well their courses fit.
 void order(const Reading& in, Incident& incident) {
-  const Interval window = {incident.start - kBefore - kHealthy, std::min(incident.end + kBehind, incident.start + kFitted)};
+  const Interval window = {incident.start - kBefore - kHealthy,
+                           std::min(incident.end + kBehind, incident.start + kFitted)};
   const detector::CourseGrid grid = detector::course_grid(window, incident.start);
   std::vector<FaultType> faults;
   for (const IncidentCandidate& candidate : incident.candidates) {
@@ -293,16 +318,14 @@ void order(const Reading& in, Incident& incident) {
   std::erase_if(rows, [](const detector::CourseRows& r) { return r.residual.size() == 0; });
   const std::vector<detector::CourseFit> fits = detector::fit_courses(faults, grid, rows);
   std::vector<double> cost(faults.size(), core::kInfinity);
-  double least = core::kInfinity;
   for (std::size_t k = 0; k < faults.size(); ++k) {
     IncidentCandidate& candidate = incident.candidates[k];
-    if (fits[k].known) {
+    if (const auto still = stands_still(in, incident, candidate.finding); still && *still >= kStill) {
+      cost[k] = -core::kInfinity;
+    } else if (fits[k].known) {
       cost[k] = fits[k].cost;
       candidate.left = fits[k].left;
       candidate.guess = fits[k].size;
-      least = std::min(least, cost[k]);
-    } else if (const auto still = stands_still(in, incident, candidate.finding); still && *still >= kStill) {
-      cost[k] = -core::kInfinity;
     }
   }
   // A course that falls has to be likelier by far than one of a narrower class.
@@ -321,14 +344,18 @@ void order(const Reading& in, Incident& incident) {
       sorted.push_back(k);
     }
   }
-  std::ranges::stable_sort(sorted, {}, [&](std::size_t k) { return cost[k]; });
+  // A reading of zero is a special case of one that stays.
+  std::ranges::stable_sort(sorted, {}, [&](std::size_t k) { return std::pair(cost[k], faults[k].held_effort); });
   std::vector<IncidentCandidate> ordered;
   for (const std::size_t k : sorted) {
     IncidentCandidate candidate = incident.candidates[k];
     const double first = cost[sorted.front()];
+    widen_course(incident, fits[k], window.lower, candidate);
     if (std::isfinite(cost[k]) && std::isfinite(first)) {
       candidate.behind = cost[k] - first;
       candidate.as_likely = !ordered.empty() && *candidate.behind < kLikelier;
+    } else {
+      candidate.as_likely = !ordered.empty() && cost[k] == first;
     }
     ordered.push_back(std::move(candidate));
   }
@@ -400,7 +427,8 @@ void explain_courses(LogSource& log, const OnlineModel& model, const Detection& 
   gather_stretches(log, stretches);
   for (std::size_t k = 0; k < groups.size(); ++k) {
     const Reading reading(stretches[k].table, model, threads);
-    std::vector<Incident> left = groups[k].size() > 1 ? join_growing(reading, moments, groups[k]) : std::move(groups[k]);
+    std::vector<Incident> left =
+        groups[k].size() > 1 ? join_growing(reading, moments, groups[k]) : std::move(groups[k]);
     for (Incident& incident : left) {
       take_courses(reading, moments, incident);
       incidents.push_back(std::move(incident));

@@ -28,17 +28,17 @@ namespace wheelwright::commission {
                                                           const EventIsolationOptions& options = {});
 
 /// What is left of incidents, of `detection` and `kinematic`, whose faults need not be steps. Walks `log` once and holds
-/// the rows from 3 s before to 1 s behind incidents that lie within 180 s.
+/// the rows from some seconds before to 1 s behind incidents that lie within 180 s.
 ///
 /// - Incidents that one fault explains which only grows are joined.
 /// - Incident::sizes is filled: what both residuals say of the size over time of each fault of the catalogue that has
 ///   one. Faults that no course of the size explains are left out, and so are those of which nothing is known.
 /// - Candidates are the faults that explain all of the incident as steps or as faults that grow; where there are none,
-///   or where it is likelier by far, those whose size rose and fell. **Of a step or a fault that only grows the true kind
-///   is never lost.** Effort readings and encoders that are said to stand still, and do not until the incident's end, are
-///   left out.
-/// - They are ordered by the cost of their best course (detector/faults/course_fit.hpp): an estimate, no proof. A reading
-///   that stands still for a second and more while the robot moves comes first.
+///   or where it is likelier by far, those whose size rose and fell. **Of a step or a fault that only grows the true
+///   kind is never lost.** Readings that are said to stand still, and do not until the incident's end, are left out.
+///   A candidate whose best course takes more than a second to come is told as one that grows, with its band.
+/// - They are ordered by the cost of their best course (detector/faults/course_fit.hpp): an estimate, no proof. A
+///   reading that stands still for a second and more while the robot moves comes first.
 void explain_courses(LogSource& log, const OnlineModel& model, const Detection& detection,
                      const KinematicWatch& kinematic, std::vector<detector::Incident>& incidents,
                      std::size_t threads = 1);

@@ -25,12 +25,12 @@ namespace {
 
 constexpr std::array<double, 22> kOffsets = {-6.0, -3.0, -1.5, -0.8, -0.4, -0.2, -0.1, 0.0,  0.1,  0.3,  0.7,
                                              1.5,  2.5,  4.0,  6.0,  9.0,  13.0, 18.0, 25.0, 34.0, 46.0, 60.0};  // s
-constexpr std::size_t kBetween = 3;   // times of responses between two knots
-constexpr double kFloor = 0.02;       // of an output's scale: errors of a model that fits
-constexpr double kApart = 4.0;        // 1/β between independent rows
-constexpr int kReweighted = 4;        // times
-constexpr int kSweeps = 200;          // of coordinates
-constexpr double kRidge = 1e-6;       // of the largest diagonal entry
+constexpr std::size_t kBetween = 3;  // times of responses between two knots
+constexpr double kFloor = 0.02;      // of an output's scale: errors of a model that fits
+constexpr double kApart = 4.0;       // 1/β between independent rows
+constexpr int kReweighted = 4;       // times
+constexpr int kSweeps = 3000;        // of coordinates
+constexpr double kRidge = 1e-6;      // of the largest diagonal entry
 
 // Up to `most` settled instants of the window, half of them within some seconds of its beginning.
 std::vector<std::size_t> instants_of(const ReferenceMotion& motion, const Interval& window, std::size_t most) {
@@ -60,8 +60,8 @@ void take_residual(const ReferenceMotion& motion, const std::vector<std::size_t>
     for (std::size_t i = 0; i < n; ++i) {
       const auto at = static_cast<Eigen::Index>(instants[r] * n + i);
       out.residual[static_cast<Eigen::Index>(r * n + i)] = rows.y[at] - rows.Y.row(at).dot(estimate);
-      halves[i].push_back(
-          0.5 * rule.at({rows.Y.row(at).data(), p}, {rows.dY.row(at).data(), p}, rows.dy[at], i).width());
+      halves[i].push_back(0.5 *
+                          rule.at({rows.Y.row(at).data(), p}, {rows.dY.row(at).data(), p}, rows.dy[at], i).width());
     }
   }
   out.scale = Eigen::VectorXd::Ones(static_cast<Eigen::Index>(n));
@@ -181,7 +181,7 @@ Eigen::VectorXd non_negative(const Eigen::MatrixXd& gram, const Eigen::VectorXd&
         moved = std::max(moved, change * change * curvature);
       }
     }
-    if (moved <= 1e-12 * (1.0 + std::abs(right.dot(x)))) {
+    if (moved <= 1e-10 * std::abs(right.dot(x))) {
       break;
     }
   }
@@ -199,7 +199,39 @@ enum class Way { rising, falling, any, once };
 
 struct Solution {
   double cost = core::kInfinity, left = 1.0, amount = 0.0;
+  Eigen::VectorXd parts{};
 };
+
+// Time in which parts of one sign go from a tenth to nine tenths of their sum.
+double rise_of(const Eigen::VectorXd& parts, const CourseGrid& grid) {
+  const double all = parts.cwiseAbs().sum();
+  const auto knots = static_cast<Eigen::Index>(grid.knots.size());
+  double sum = std::abs(parts[0]), low = -core::kInfinity, high = -core::kInfinity;
+  bool begun = sum > 0.1 * all, ended = sum > 0.9 * all;
+  const auto pass = [&](double amount, double from, double to) {
+    const auto at = [&](double level) {
+      return amount > 0.0 ? from + (to - from) * std::clamp((level * all - sum) / amount, 0.0, 1.0) : from;
+    };
+    if (!begun && sum + amount > 0.1 * all) {
+      low = at(0.1);
+      begun = true;
+    }
+    if (!ended && sum + amount > 0.9 * all) {
+      high = at(0.9);
+      ended = true;
+    }
+    sum += amount;
+  };
+  for (Eigen::Index j = 0; j < knots; ++j) {
+    const double t = grid.knots[static_cast<std::size_t>(j)];
+    pass(std::abs(parts[1 + j]), t, t);
+    if (j + 1 < knots) {
+      pass(std::abs(parts[1 + knots + j]), t, grid.knots[static_cast<std::size_t>(j + 1)]);
+    }
+  }
+  // Of what was there before it is not known how long it took.
+  return std::isfinite(low) && std::isfinite(high) ? high - low : std::isfinite(high) ? high - grid.knots.front() : 0.0;
+}
 
 // Everything of one fault: outputs of all residuals.
 class Fit {
@@ -245,6 +277,7 @@ class Fit {
         out.grows = way != Way::any;
         const double sigma = way == Way::falling || (way == Way::any && found.amount < 0.0) ? -1.0 : 1.0;
         out.size = size_of(fault_, sigma, std::abs(found.amount));
+        out.rise = out.grows ? rise_of(found.parts, grid_) : 0.0;
       }
     };
     out.cost = core::kInfinity;
@@ -289,11 +322,11 @@ class Fit {
   [[nodiscard]] Solution solve(Way way, const std::vector<Channel>& channels) const {
     const Eigen::Index parts = channels.front().right.size();
     std::vector<double> variance;
-    double independent = 0.0, all = 0.0;
+    double independent = 0.0, all = 0.0, rest = 0.0;
     for (const Channel& channel : channels) {
       variance.push_back(channel.variance(channel.square));
       independent += channel.independent;
-      all += channel.square / channel.variance(channel.square);
+      all += channel.square;
     }
     Eigen::VectorXd x = Eigen::VectorXd::Zero(parts);
     for (int turn = 0; turn < kReweighted; ++turn) {
@@ -310,17 +343,17 @@ class Fit {
       }
     }
     Solution out{.cost = 0.0};
-    double rest = 0.0;
     for (const Channel& channel : channels) {
       const double left = channel.left(x);
       out.cost += 0.5 * channel.independent * std::log(channel.variance(left));
-      rest += left / channel.variance(channel.square);
+      rest += left;
     }
     const double largest = x.cwiseAbs().maxCoeff();
     const auto used = static_cast<double>((x.array().abs() > 1e-3 * largest).count());
     out.cost += 0.5 * (way == Way::once ? 1.0 : used) * std::log(std::max(independent, 2.0));
     out.left = all > 0.0 ? std::sqrt(rest / all) : 1.0;
     out.amount = x.sum();
+    out.parts = x;
     return out;
   }
 
@@ -397,10 +430,10 @@ CourseRows course_rows(const ReferenceMotion& motion, const filter::RegressorFil
 }
 
 CourseRows course_rows_by_odometry(const OdometryReference& reference, const Model& model,
-                                   const filter::OdometryMeasurement& measurement,
-                                   const filter::OdometryErrors& errors, double length, const Eigen::VectorXd& estimate,
-                                   const bounds::Polytope& set, const std::vector<FaultType>& faults,
-                                   const Interval& window, const CourseGrid& grid, std::size_t most) {
+                                   const filter::OdometryMeasurement& measurement, const filter::OdometryErrors& errors,
+                                   double length, const Eigen::VectorXd& estimate, const bounds::Polytope& set,
+                                   const std::vector<FaultType>& faults, const Interval& window, const CourseGrid& grid,
+                                   std::size_t most) {
   const std::vector<std::size_t> instants = instants_of(reference.motion, window, most);
   CourseRows out;
   out.ways = true;

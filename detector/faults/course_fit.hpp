@@ -10,8 +10,8 @@
 /// **growing**: no part of it falls, non-negative least squares; **any**: least squares. An output's errors are taken
 /// as Gaussian, their variance that of what the fit leaves and of a floor, which is estimated with the fit
 /// (reweighted). The cost of a fault is the negative logarithm of that likelihood and half the logarithm of the number
-/// of independent rows for each part of λ (Schwarz's criterion); rows within 4/β, or a window of the kinematic residual,
-/// of each other are not independent. A fault that leaves no trace in a residual has to leave that residual as it is.
+/// of independent rows for each part of λ (Schwarz's criterion); rows within 4/β of each other, or within a window of
+/// the kinematic residual, are not independent. A fault that leaves no trace in a residual has to leave that residual as it is.
 ///
 /// The cost is an estimate: errors of θ̂ and of the model are in what is left. It orders, it excludes nothing.
 #pragma once
@@ -47,12 +47,12 @@ struct CourseGrid {
 /// Rows of one residual, and what steps of each fault do to them.
 struct CourseRows {
   std::size_t outputs = 0;
-  double independent = 0.0;                   ///< rows that count as independent, of each output
-  Eigen::VectorXd residual{};                 ///< ε, row by row, output by output
-  Eigen::VectorXd scale{};                    ///< of each output: half of a threshold's width, in the middle of all
-  std::vector<Eigen::MatrixXd> responses{};   ///< of each fault: rows × (1 + times), of a step of amount 1 (`ways`: of
-                                              ///< κ = 1) from before and from each time on; empty where it is not known
-  bool ways = false;                          ///< of the kinematic residual
+  double independent = 0.0;                  ///< rows that count as independent, of each output
+  Eigen::VectorXd residual{};                ///< ε, row by row, output by output
+  Eigen::VectorXd scale{};                   ///< of each output: half of a threshold's width, in the middle of all
+  std::vector<Eigen::MatrixXd> responses{};  ///< of each fault: rows × (1 + times), of a step of amount 1 (`ways`: of
+                                             ///< κ = 1) from before and from each time on; empty where it is not known
+  bool ways = false;                         ///< of the kinematic residual
 };
 
 /// Rows of the torque residual in the window, at most `most` of them. `estimate` is θ̂; the rest as for size_evidence().
@@ -71,11 +71,12 @@ struct CourseRows {
 
 /// The best course of one fault.
 struct CourseFit {
-  bool known = false;    ///< false: nothing of the below, no residual's responses are known
-  bool grows = true;     ///< the likeliest course never falls
-  double cost = 0.0;     ///< as above, but for a constant that all faults share
-  double left = 1.0;     ///< root of what is left over root of what there is, weighted alike for all faults
-  double size = 0.0;     ///< of that course at the end of the window, the fault's unit
+  bool known = false;  ///< false: nothing of the below, no residual's responses are known
+  bool grows = true;   ///< the likeliest course never falls
+  double cost = 0.0;   ///< as above, but for a constant that all faults share
+  double left = 1.0;   ///< root mean square of what is left over that of ε, both in the outputs' scales
+  double size = 0.0;   ///< of that course at the end of the window, the fault's unit
+  double rise = 0.0;   ///< s from a tenth to nine tenths of that size, where it grows
 };
 
 /// Fits each of `faults` to the rows of all residuals.

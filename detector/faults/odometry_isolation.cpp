@@ -293,10 +293,9 @@ Isolation isolate_by_odometry(const OdometryReference& reference, const Model& m
 }
 
 Eigen::MatrixXd odometry_responses(const OdometryReference& reference, const Model& model,
-                                   const filter::OdometryMeasurement& measurement,
-                                   const filter::OdometryErrors& errors, const FaultType& fault,
-                                   const Eigen::VectorXd& theta, const std::vector<std::size_t>& instants,
-                                   const std::vector<double>& times) {
+                                   const filter::OdometryMeasurement& measurement, const filter::OdometryErrors& errors,
+                                   const FaultType& fault, const Eigen::VectorXd& theta,
+                                   const std::vector<std::size_t>& instants, const std::vector<double>& times) {
   const ReferenceMotion& motion = reference.motion;
   const auto outputs = static_cast<Eigen::Index>(measurement.outputs().size());
   if (!rows_are_known(fault) || motion.instants() < 4) {

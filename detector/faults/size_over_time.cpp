@@ -20,8 +20,8 @@
 namespace wheelwright::detector {
 namespace {
 
-constexpr double kRounded = 1e-7;         // of all that is added in a sum: its rounding, and what is forgotten
-constexpr std::size_t kInstants = 200;    // of SizeOverTime::growing
+constexpr double kRounded = 1e-7;       // of all that is added in a sum: its rounding, and what is forgotten
+constexpr std::size_t kInstants = 200;  // of SizeOverTime::growing
 constexpr std::array<double, 5> kEarlier = {1.0, 2.0, 3.5, 5.0, 8.0};  // 1/β before a row: T0
 
 // Whether rows have a part in κ²: motion and efforts change at once.
@@ -481,7 +481,13 @@ std::vector<SizeEvidence> size_evidence(const ReferenceMotion& motion, const Reg
                   static_cast<std::size_t>(efforts.cols()) == motion.instants(),
               "efforts", "joints × instants");
   std::vector<SizeEvidence> out(faults.size());
-  TorqueRows in{motion, filter, efforts, set, rows_within(motion, window, options.most_rows, options.also), {}, motion.most_effort};
+  TorqueRows in{motion,
+                filter,
+                efforts,
+                set,
+                rows_within(motion, window, options.most_rows, options.also),
+                {},
+                motion.most_effort};
   if (in.most_effort <= 0.0) {
     in.most_effort = core::kInfinity;
   }
@@ -735,7 +741,8 @@ std::vector<SizeEvidence> size_evidence_by_odometry(const OdometryReference& ref
                                                     const SizeOptions& options) {
   const ReferenceMotion& motion = reference.motion;
   check::that(set.dimension() == motion.rows.parameters, "set", "as many parameters as the rows");
-  OdometryRows in{reference, model, measurement, errors, set, rows_within(motion, window, options.most_rows, options.also), {}};
+  OdometryRows in{
+      reference, model, measurement, errors, set, rows_within(motion, window, options.most_rows, options.also), {}};
   const ThresholdRule rule(set, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(set.dimension())));
   bool healthy = true;
   for (const std::size_t row : in.rows) {

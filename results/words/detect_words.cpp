@@ -216,16 +216,18 @@ std::string incident_sentence(const detector::Incident& incident) {
     });
     const auto alike = static_cast<std::size_t>(
         std::ranges::count(incident.candidates, true, &detector::IncidentCandidate::as_likely));
-    text = told && first.left.value_or(0.0) > kFitsBadly
-               ? "no fault of the catalogue fits this well: another load or ground (compare with the log that the model "
-                 "was learnt on by `wheelwright gap`), several faults, or one that it lacks; the nearest: "
-           : !told && !incident.stays
-               ? fmt::format("no one fault that stays explains all of this: several faults, or one that grows; from the "
-                             "event at {:.2f} s on it may be: ",
-                             first.since)
-           : none_at_risk ? "at the stated risk no fault that was examined, each as one that stays; for certain not "
-                            "excluded: "
-                          : "";
+    text =
+        told && first.left.value_or(0.0) > kFitsBadly
+            ? "no fault of the catalogue fits this well: another load or ground (compare with the log that the model "
+              "was learnt on by `wheelwright gap`), several faults, or one that it lacks; the nearest: "
+        : !told && !incident.stays
+            ? fmt::format(
+                  "no one fault that stays explains all of this: several faults, or one that grows; from the "
+                  "event at {:.2f} s on it may be: ",
+                  first.since)
+        : none_at_risk ? "at the stated risk no fault that was examined, each as one that stays; for certain not "
+                         "excluded: "
+                       : "";
     text += faults.front() + any_course(incident);
     const auto list = [&](std::size_t from, std::size_t to) {
       const std::size_t shown = std::min(to, from + kMostOthers);
@@ -239,9 +241,7 @@ std::string incident_sentence(const detector::Incident& incident) {
       list(1, 1 + alike);
     }
     if (faults.size() > 1 + alike) {
-      text += told                             ? "; less likely, not excluded: "
-              : none_at_risk && incident.stays ? "; "
-                                               : "; also possible: ";
+      text += told ? "; less likely, not excluded: " : none_at_risk && incident.stays ? "; " : "; also possible: ";
       list(1 + alike, faults.size());
     }
   }

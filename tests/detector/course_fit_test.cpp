@@ -11,6 +11,7 @@
 #include "commission/event_isolation.hpp"
 #include "commission/watch/detector_walk.hpp"
 #include "commission/watch/incident_watch.hpp"
+#include "core/limits.hpp"
 #include "detector/faults/course_fit.hpp"
 #include "detector/online_model.hpp"
 #include "tests/detector/detectability.hpp"
@@ -39,13 +40,15 @@ struct Rows {
 
   // What fault k does to output i at a time.
   static double signal(std::size_t k, Eigen::Index i, double at) {
-    return k == 0 ? (i == 0 ? 1.0 + 0.4 * std::sin(at) : 0.5 * std::cos(1.3 * at)) : (i == 0 ? std::cos(0.7 * at) : 1.0);
+    return k == 0 ? (i == 0 ? 1.0 + 0.4 * std::sin(at) : 0.5 * std::cos(1.3 * at))
+                  : (i == 0 ? std::cos(0.7 * at) : 1.0);
   }
   // ∫ signal over [from, to] with the weights e^(−(at − τ)), by small steps.
-  static double response(std::size_t k, Eigen::Index i, double from, double at, const std::function<double(double)>& of) {
-    constexpr double h = 0.005;
+  static double response(std::size_t k, Eigen::Index i, double from, double at,
+                         const std::function<double(double)>& of) {
+    constexpr double h = 0.02;
     double sum = 0.0;
-    for (double tau = std::max(from, at - 12.0) + 0.5 * h; tau < at; tau += h) {
+    for (double tau = std::max(from, at - 9.0) + 0.5 * h; tau < at; tau += h) {
       sum += h * std::exp(tau - at) * signal(k, i, tau) * of(tau);
     }
     return sum;
@@ -94,6 +97,11 @@ TEST(CourseFit, TheFaultWhoseCourseFitsCostsLeastAndItsSizeIsFound) {
       EXPECT_TRUE(fits[truth].grows) << name << ", " << truth;
       EXPECT_NEAR(fits[truth].size, course(20.0), 0.02) << name << ", " << truth;
       EXPECT_LT(fits[truth].left, 0.1) << name << ", " << truth;
+      if (name == "ramp") {
+        EXPECT_NEAR(fits[truth].rise, 4.0, 1.0) << truth;
+      } else {
+        EXPECT_LT(fits[truth].rise, 0.5) << name << ", " << truth;
+      }
       EXPECT_GT(fits[1 - truth].left, 2.0 * fits[truth].left) << name << ", " << truth;
     }
   }
@@ -151,7 +159,7 @@ TEST(CourseFit, AFaultThatGrowsIsOneIncidentThatNamesItFirst) {
   // An effort that delivers ever less, up to half, over 6 s.
   const auto lost = [](double t) { return 0.5 * std::clamp((t - 10.0) / 6.0, 0.0, 1.0); };
   for (const std::uint64_t seed : {2ULL, 3ULL}) {
-    for (const char* side : {"_r", "_l"}) {
+    for (const char* side : {seed == 2 ? "_r" : "_l"}) {
       const std::vector<Incident> incidents = incidents_of(seed, {}, [&](LogTable& log) {
         std::vector<double>& effort = log.column(std::string("tau") + side);
         for (std::size_t k = 0; k < log.rows(); ++k) {
