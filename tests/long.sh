@@ -47,7 +47,7 @@ for part in ${*:-slow campaign sanitizers}; do
       ;;
     incidents)
       tools/build.sh release wheelwright
-      tests/campaigns/incidents.py --lost 0 0.01 0.03
+      tests/campaigns/incidents.py --cases 1000 --robots 12 --lost 0 0.01 0.03
       ;;
     coverage)
       tools/build.sh coverage

@@ -27,7 +27,7 @@ namespace wheelwright::commission {
                                                           const KinematicWatch& kinematic,
                                                           const EventIsolationOptions& options = {});
 
-/// What is left of incidents, of `detection` and `kinematic`, whose faults need not be steps. Walks `log` once and holds
+/// What is left of incidents, of `detection` and `kinematic`, whose faults need not be steps. Walks `log` once, holds
 /// the rows from some seconds before to 1 s behind incidents that lie within 180 s.
 ///
 /// - Incidents that one fault explains which only grows are joined.

@@ -119,7 +119,8 @@ std::string sentence(const OtherParameters& other) {
   }
   return fmt::format(
       "other constant parameters explain the whole drive{}{}: another ground or load than the model was learnt on, or "
-      "a fault from before the first row; compare with the log that it was learnt on by `wheelwright gap`",
+      "a fault that looks alike, as one from before the first row; compare with the log that it was learnt on by "
+      "`wheelwright gap`",
       parts.empty() ? "" : ": ", core::enumerated(parts));
 }
 

@@ -8,10 +8,10 @@
 /// knots about the first instant outside and of ramps between them:
 ///
 /// **growing**: no part of it falls, non-negative least squares; **any**: least squares. An output's errors are taken
-/// as Gaussian, their variance that of what the fit leaves and of a floor, which is estimated with the fit
-/// (reweighted). The cost of a fault is the negative logarithm of that likelihood and half the logarithm of the number
-/// of independent rows for each part of λ (Schwarz's criterion); rows within 4/β of each other, or within a window of
-/// the kinematic residual, are not independent. A fault that leaves no trace in a residual has to leave that residual as it is.
+/// as Gaussian, their variance that of what the fit leaves and of a floor, which is estimated with the fit. The cost of
+/// a fault is the negative logarithm of that likelihood and half the logarithm of the number of independent rows for
+/// each part of λ (Schwarz's criterion); rows within 4/β of each other, or within a window of the kinematic residual,
+/// are not independent. A fault that leaves no trace in a residual has to leave that residual as it is.
 ///
 /// The cost is an estimate: errors of θ̂ and of the model are in what is left. It orders, it excludes nothing.
 #pragma once
@@ -55,7 +55,7 @@ struct CourseRows {
   bool ways = false;                         ///< of the kinematic residual
 };
 
-/// Rows of the torque residual in the window, at most `most` of them. `estimate` is θ̂; the rest as for size_evidence().
+/// Rows of the torque residual in the window, at most `most`. `estimate` is θ̂; the rest is as for size_evidence().
 [[nodiscard]] CourseRows course_rows(const ReferenceMotion& motion, const filter::RegressorFilter& filter,
                                      const Eigen::VectorXd& estimate, const bounds::Polytope& set,
                                      const std::vector<FaultType>& faults, const Interval& window,

@@ -222,6 +222,37 @@ TEST(IncidentSentence, BeginsWithWhatTheStatedRiskLeaves) {
   EXPECT_THAT(incident_sentence(incident), testing::StartsWith("nothing of the catalogue"));
 }
 
+// What the fits say: the likeliest first by its course, what is not told from it, and that nothing fits well.
+TEST(IncidentSentence, TellsTheLikeliestCourse) {
+  const OnlineModel model = example::done().model;
+  const std::vector<model::FaultType> faults = model::fault_catalogue(model.model, Eigen::VectorXd::Ones(4));
+  detector::Incident incident;
+  incident.events = incident.examined = 1;
+  for (const std::size_t k : {0, 2, 3}) {
+    detector::IncidentCandidate candidate;
+    candidate.finding.fault = faults[k];
+    candidate.finding.verdict = detector::FaultFinding::Verdict::consistent;
+    candidate.course = detector::CourseClass::growing;
+    candidate.changes = true;
+    candidate.behind = 2.0 * static_cast<double>(k);
+    candidate.left = 0.1;
+    candidate.guess = -0.205;
+    incident.candidates.push_back(candidate);
+  }
+  incident.stays = false;
+  EXPECT_THAT(incident_sentence(incident),
+              AllOf(testing::StartsWith(faults[0].sentence + ", a fault that grew, best fit at the end -20.5 %"),
+                    HasSubstr("; less likely, not excluded: " + faults[2].sentence), Not(HasSubstr("not tell it"))));
+  incident.candidates[1].as_likely = true;
+  incident.candidates[0].course = detector::CourseClass::any;
+  EXPECT_THAT(incident_sentence(incident),
+              AllOf(testing::StartsWith(faults[0].sentence + ", a fault whose size rose and fell"),
+                    HasSubstr("; this log does not tell it from: " + faults[2].sentence),
+                    HasSubstr("; less likely, not excluded: " + faults[3].sentence)));
+  incident.candidates[0].left = 0.9;
+  EXPECT_THAT(incident_sentence(incident), testing::StartsWith("no fault of the catalogue fits this well"));
+}
+
 // Sizes over time stand beside the candidate, and faults that only growing explains are named.
 TEST(IncidentSentence, TellsSizesOverTime) {
   const OnlineModel model = example::done().model;
