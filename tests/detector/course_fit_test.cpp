@@ -128,9 +128,10 @@ TEST(CourseFit, WhatAResidualDoesNotShowSpeaks) {
   EXPECT_LT(fits[0].cost + 3.0, fits[1].cost);
 }
 
-// Incidents of a robot with a pose, of a drive of another seed, with `size` of a fault of an effort or a radius.
-std::vector<Incident> incidents_of(std::uint64_t seed, const std::vector<model::Fault>& faults,
-                                   const std::function<void(LogTable&)>& change) {
+// Incidents of a robot with a pose, of a drive of another seed whose log is changed; cut in two at `cut` (s) where that
+// is within one, before their courses are asked for.
+std::vector<Incident> incidents_of(std::uint64_t seed, const std::function<void(LogTable&)>& change,
+                                   double cut = core::kInfinity) {
   Scenario s = testing_support::with_pose(random_robot(seed));
   s.duration = 24.0;
   Simulation learning(s);
@@ -142,7 +143,6 @@ std::vector<Incident> incidents_of(std::uint64_t seed, const std::vector<model::
   s.trajectory.period = 9.0;
   s.duration = 40.0;
   s.seed = seed + 1000;
-  s.faults = faults;
   Simulation driven(s);
   LogTable table = read_all(driven);
   change(table);
@@ -151,6 +151,15 @@ std::vector<Incident> incidents_of(std::uint64_t seed, const std::vector<model::
   const commission::KinematicWatch kinematic = commission::watch_kinematics(log, result.model, {});
   std::vector<Incident> incidents = commission::join_events(
       log, result.model, detection, commission::isolate_events(log, result.model, detection), kinematic);
+  for (std::size_t k = 0; k < incidents.size(); ++k) {
+    if (incidents[k].start < cut && cut < incidents[k].end) {
+      Incident later = incidents[k];
+      later.start = later.alarm = cut;
+      incidents[k].end = cut - 1.0;
+      incidents.insert(incidents.begin() + static_cast<std::ptrdiff_t>(k) + 1, later);
+      break;
+    }
+  }
   commission::explain_courses(log, result.model, detection, kinematic, incidents);
   return incidents;
 }
@@ -160,7 +169,7 @@ TEST(CourseFit, AFaultThatGrowsIsOneIncidentThatNamesItFirst) {
   const auto lost = [](double t) { return 0.5 * std::clamp((t - 10.0) / 6.0, 0.0, 1.0); };
   for (const std::uint64_t seed : {2ULL, 3ULL}) {
     for (const char* side : {seed == 2 ? "_r" : "_l"}) {
-      const std::vector<Incident> incidents = incidents_of(seed, {}, [&](LogTable& log) {
+      const std::vector<Incident> incidents = incidents_of(seed, [&](LogTable& log) {
         std::vector<double>& effort = log.column(std::string("tau") + side);
         for (std::size_t k = 0; k < log.rows(); ++k) {
           effort[k] /= 1.0 - lost(log.t[k]);
@@ -182,9 +191,34 @@ TEST(CourseFit, AFaultThatGrowsIsOneIncidentThatNamesItFirst) {
   }
 }
 
+TEST(CourseFit, IncidentsOfOneGrowingFaultAreJoinedThoseOfTwoFaultsAreNot) {
+  const auto spoil = [](LogTable& log, bool both) {
+    std::vector<double>&left = log.column("tau_l"), &right = log.column("tau_r");
+    double largest = 0.0;
+    for (const double value : right) {
+      largest = std::max(largest, std::abs(value));
+    }
+    for (std::size_t k = 0; k < log.rows(); ++k) {
+      left[k] /= 1.0 - (both ? (log.t[k] < 10.0 ? 0.0 : 0.4) : 0.4 * std::clamp((log.t[k] - 10.0) / 20.0, 0.0, 1.0));
+      right[k] += both && log.t[k] >= 24.0 ? 0.8 * largest : 0.0;
+    }
+  };
+  const std::vector<Incident> one = incidents_of(
+      2, [&](LogTable& log) { spoil(log, false); }, 24.0);
+  ASSERT_EQ(one.size(), 1U);
+  EXPECT_FALSE(one.front().stays);
+  EXPECT_LT(one.front().start, 24.0);
+  EXPECT_GT(one.front().end, 30.0);
+  EXPECT_EQ(one.front().candidates.front().finding.fault.name, "effort_loss_left");
+  const std::vector<Incident> two = incidents_of(
+      2, [&](LogTable& log) { spoil(log, true); }, 24.0);
+  ASSERT_GE(two.size(), 2U);
+  EXPECT_EQ(two.front().candidates.front().finding.fault.name, "effort_loss_left");
+}
+
 TEST(CourseFit, AReadingThatGoesOnDoesNotStandStill) {
   // A bias: what is left of an effort that "stays at its value" is excluded by the reading itself.
-  const std::vector<Incident> incidents = incidents_of(2, {}, [](LogTable& log) {
+  const std::vector<Incident> incidents = incidents_of(2, [](LogTable& log) {
     std::vector<double>& effort = log.column("tau_r");
     double largest = 0.0;
     for (const double value : effort) {
