@@ -313,9 +313,11 @@ std::optional<EvenClock> check_clock(const HealthView& view, std::vector<LogFind
   const EvenClock clock{.step = grid.step, .drift = drift_of(view, grid)};
   const MovedShare moved = moved_share(view, grid);
   const bool told = moved.error < kClockTold;
-  const bool even = told && 1.0 - moved.share > kClockSure * moved.error &&
-                    std::abs(moved.share) < std::max(kClockMoved, 3.0 * moved.error);
-  if (!even && (bursts || told || scatter < kClockScattersMuch)) {
+  const bool may_be_true = 1.0 - moved.share < kClockSure * moved.error;
+  const bool may_be_even = moved.share < std::max(kClockMoved, 3.0 * moved.error);  // below 0 by chance
+  const bool even = told && may_be_even && !may_be_true;
+  const bool follow = told && may_be_true && !may_be_even;  // samples are where their stamps say
+  if (!even && (bursts || follow || scatter < kClockScattersMuch)) {
     return by_stamps();
   }
   const std::string scatters =

@@ -39,6 +39,7 @@ struct Case {
   double lost = 0.0;
   std::optional<int> counts = 4096;  // a turn; nothing: exact angles
   bool speeds = false;               // in place of angles
+  double speed_noise = 0.001;        // rad/s, uniform
   bool really_uneven = false;        // samples are where their stamps say
   std::size_t seed = 1;
 };
@@ -63,7 +64,7 @@ LogTable a_log(const Case& c, const std::function<double(std::size_t, std::mt199
     for (std::size_t side = 0; side < 2; ++side) {
       double value = wheel(taken, side == 0 ? 1.0 : -1.0, c.speeds ? 1 : 0);
       if (c.speeds) {
-        value += 0.1 * noise(rng);
+        value += c.speed_noise / 0.01 * noise(rng);
       } else if (c.counts) {
         const double count = 2.0 * std::numbers::pi / *c.counts;
         value = std::floor(value / count) * count;
@@ -112,6 +113,28 @@ TEST(Clocks, EvenSamplesBehindScatteredStampsAreRecognised) {
       }
     }
   }
+}
+
+// Where the motion shows the scatter badly, chance may make it look as if samples moved against their stamps.
+TEST(Clocks, StampsThatScatterMuchAreNeverTakenForTrueInSilence) {
+  std::size_t read = 0, untold = 0;
+  for (const double noise : {0.03, 0.1, 0.3}) {
+    for (std::size_t seed = 1; seed <= 100; ++seed) {
+      const Case c{.step = 0.1, .speeds = true, .speed_noise = noise, .seed = seed};
+      std::vector<LogFinding> findings;
+      const bool clock = clock_of(a_log(c, scatters(0.075)[0]), findings).has_value();
+      EXPECT_TRUE(clock || !findings.empty()) << noise << ", seed " << seed;
+      read += clock ? 1 : 0;
+      untold += clock ? 0 : 1;
+      std::vector<LogFinding> true_ones;
+      EXPECT_FALSE(clock_of(a_log({.step = 0.1, .speeds = true, .speed_noise = noise, .really_uneven = true, .seed = seed},
+                                  scatters(0.075)[0]),
+                            true_ones))
+          << noise << ", seed " << seed;
+    }
+  }
+  EXPECT_GT(read, 100U);
+  EXPECT_LT(untold, 150U);
 }
 
 TEST(Clocks, SamplesThatAreWhereTheirStampsSayStayThere) {
