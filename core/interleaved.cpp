@@ -15,6 +15,7 @@ namespace {
 constexpr double kApart = 5.0;          // distances of the neighbours
 constexpr double kOfRange = 0.02;       // of a column's range
 constexpr std::size_t kFine = 50;       // values of a column that is finely resolved
+constexpr double kSameValue = 2e-3;     // of a column's range: counts over a measured step scatter by less
 constexpr std::size_t kFewestRows = 5;  // of a second source
 constexpr double kLeastShare = 0.002;   // likewise
 constexpr double kAlternates = 0.3;     // steps over two rows against those over one
@@ -43,10 +44,10 @@ double range_of(const Column& values) {
   return order_statistic(known, last - last / 100) - order_statistic(known, last / 100);
 }
 
-bool is_fine(const Column& values) {
+bool is_fine(const Column& values, double range) {
   std::set<double> seen;
   for (const double v : values) {
-    if (std::isfinite(v) && seen.insert(v).second && seen.size() > kFine) {
+    if (std::isfinite(v) && seen.insert(std::round(v / (kSameValue * range))).second && seen.size() > kFine) {
       return true;
     }
   }
@@ -167,7 +168,7 @@ InterleavedRows interleaved_rows(const std::vector<const std::vector<double>*>& 
     }
     rows = columns[k]->size();
     if (const double range = range_of(*columns[k]); range > 0.0) {
-      telling.push_back({columns[k], k, range, is_fine(*columns[k])});
+      telling.push_back({columns[k], k, range, is_fine(*columns[k], range)});
     }
   }
   InterleavedRows out;

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "commission/commission.hpp"
 #include "commission/contradiction_search.hpp"
 #include "commission/contradictions.hpp"
 #include "commission/doctor/log_health.hpp"
@@ -207,6 +208,15 @@ bool is_taken(const HealthView& view, const std::optional<TakenLag>& lag) {
          lag->smoothing.value_or(Interval{}).upper <= std::max(kLongestSmoothing, most);
 }
 
+// The delays that commissioning takes in, where it makes a model of efforts that come before the motion.
+std::optional<Interval> taken_as_open(LogSource& log, const Robot& robot) {
+  commission::CommissionOptions options;
+  options.at_risk = commission::CommissionOptions::AtRisk::nothing;
+  const commission::Commissioning result = commission::commission_robot(log, robot, options);
+  log.rewind();
+  return result.has_model() ? std::optional(result.model.robot.effort_delay) : std::nullopt;
+}
+
 // What a shift asks for.
 std::string advice(const Setting& s, double steps, bool matters, bool large) {
   if (matters && s.measurement.hold == Hold::first_order && std::abs(steps + 0.5) < 0.2) {
@@ -269,9 +279,15 @@ void check_delay(const HealthView& view, LogSource& log, const Setting& s, const
     return;
   }
   const double delay = shift->delay, steps = delay / view.step;
-  const std::optional<TakenLag> lag = find_lag(view, log, s, fit, timing);
+  std::optional<TakenLag> lag = find_lag(view, log, s, fit, timing);
   const bool tried = is_taken(view, lag);
-  const bool taken = tried && (!s.noise_complete || read_as(log, with(view.robot, *lag)).explained);
+  bool taken = tried && (!s.noise_complete || read_as(log, with(view.robot, *lag)).explained);
+  if (view.robot_given && timing.told && delay < 0.0 && !taken) {
+    if (const auto open = taken_as_open(log, view.robot)) {
+      lag = TakenLag{*open, std::nullopt};
+      taken = true;
+    }
+  }
   const bool matters = timing.likely || (std::abs(delay) > 3.0 * shift->standard_error &&
                                          shift->residual_ratio < 0.95 && std::abs(steps) > 0.25);
   const bool large = matters && std::abs(steps) > 0.75;

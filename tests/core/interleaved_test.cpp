@@ -12,8 +12,8 @@ namespace {
 
 using Columns = std::vector<std::vector<double>>;
 
-// Angles, speeds and efforts of two wheels as an honest driver has them.
-Columns honest(std::size_t rows, double rate, double counts, double noise, unsigned seed) {
+// Angles, speeds and efforts of two wheels as an honest driver has them, which measures its steps to `measured`.
+Columns honest(std::size_t rows, double rate, double counts, double noise, unsigned seed, double measured = 0.0) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   Columns c(6);
@@ -25,7 +25,7 @@ Columns honest(std::size_t rows, double rate, double counts, double noise, unsig
       angle[w] += speed / rate;
       const double shown = counts > 0.0 ? std::floor(angle[w] * counts / 6.28) / counts * 6.28 : angle[w];
       c[w].push_back(shown);
-      c[2 + w].push_back(counts > 0.0 ? (shown - before[w]) * rate : speed + noise * normal(random));
+      c[2 + w].push_back(counts > 0.0 ? (shown - before[w]) * rate * (1.0 + measured * normal(random)) : speed + noise * normal(random));
       before[w] = shown;
       c[4 + w].push_back(std::cos(0.4 * t) + noise * normal(random));
     }
@@ -48,6 +48,19 @@ TEST(InterleavedRows, AnHonestLogHasOneSource) {
         const Columns c = honest(6000, rate, counts, noise, 3);
         EXPECT_TRUE(found(c).rows.empty()) << rate << " Hz, " << counts << " counts, noise " << noise;
         EXPECT_TRUE(found(c, 2).rows.empty()) << rate << " Hz, " << counts << " counts, noise " << noise;
+      }
+    }
+  }
+}
+
+// A driver that differences counts over the steps that it measures: no number is taken twice.
+TEST(InterleavedRows, CountsOverMeasuredStepsAreOneSource) {
+  for (const double rate : {10.0, 100.0, 500.0}) {
+    for (const double counts : {64.0, 256.0, 1024.0, 4096.0}) {
+      for (const double measured : {1e-14, 1e-5, 1e-3, 1e-2}) {
+        const Columns c = honest(6000, rate, counts, 0.02, 4, measured);
+        EXPECT_TRUE(found(c).rows.empty()) << rate << " Hz, " << counts << " counts, steps to " << measured;
+        EXPECT_TRUE(found(c, 2).rows.empty()) << rate << " Hz, " << counts << " counts, steps to " << measured;
       }
     }
   }

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "commission/doctor/log_health.hpp"
+#include "tests/doctor/as_found.hpp"
 
 namespace wheelwright::doctor::efforts_test {
 namespace {
@@ -101,6 +102,14 @@ std::string refusals(const LogHealth& health) {
   std::string text;
   for (const LogFinding& f : health.findings) {
     text += f.is_refusal() ? f.id + ": " + f.sentence + "\n" : "";
+  }
+  return text;
+}
+
+std::string fatal(const LogHealth& health) {
+  std::string text;
+  for (const LogFinding& f : health.findings) {
+    text += f.severity == FindingSeverity::fatal ? f.id + ": " + f.sentence + "\n" : "";
   }
   return text;
 }
@@ -350,6 +359,56 @@ TEST(Efforts, ThatAreSmoothedAreToldWithTheTimeConstant) {
       EXPECT_LT(found->value, 1.2 * tau) << found->sentence;
     }
   }
+}
+
+// Speeds by the angles in counts, from row to row.
+void difference(LogTable& log, double count) {
+  for (const std::size_t c : {0U, 1U}) {
+    std::vector<double>& speed = log.columns[c];
+    double angle = 0.0, before = 0.0, last = speed.front();
+    for (std::size_t k = 1; k < log.rows(); ++k) {
+      const double h = log.t[k] - log.t[k - 1];
+      angle += 0.5 * h * (last + speed[k]);
+      last = speed[k];
+      const double counted = count * std::floor(angle / count);
+      speed[k] = (counted - before) / h;
+      before = counted;
+    }
+    speed.front() = speed[1];
+  }
+}
+
+// Commands that are held, logged as if measured, are half a step early; more where they are logged earlier.
+TEST(Efforts, ThatComeBeforeTheMotionAreTakenInByDoctorWhereCommissionMakesAModelOfThem) {
+  std::size_t taken = 0;
+  for (const double rate : {100.0, 400.0}) {
+    for (const int early : {0, 1, 4}) {  // rows
+      for (const int counts : {0, 256, 1024}) {  // a turn, of angles that are differenced
+        LogTable log = drive({.rate = rate, .seconds = 40.0, .effort_noise = 0.1, .seed = 8});
+        if (counts > 0) {
+          difference(log, 2.0 * std::numbers::pi / counts);
+        }
+        for (const std::size_t c : {2U, 3U}) {
+          std::rotate(log.columns[c].begin(), log.columns[c].begin() + early, log.columns[c].end());
+        }
+        const Robot robot = robot_of(false);
+        const LogHealth health = examine(log, robot);
+        const commission::Commissioning result = testing_support::commissioned_as_found(log, robot, health);
+        const LogFinding* found = health.find("time.effort_delay");
+        EXPECT_EQ(result.has_model(), health.verdict == LogVerdict::commission)
+            << rate << " Hz, " << early << ", " << counts << ": " << result.message << '\n'
+            << (found != nullptr ? found->sentence : "") << fatal(health);
+        if (found == nullptr) {
+          continue;
+        }
+        if (found->taken && found->taken->lower < 0.0) {
+          ++taken;
+          EXPECT_LE(found->taken->lower, -(early + 0.5) / rate + 0.2 / rate) << found->sentence;
+        }
+      }
+    }
+  }
+  EXPECT_GT(taken, 0U);
 }
 
 // Held commands that act from stamp to stamp are late by less than a step only where they are smoothed.

@@ -13,6 +13,7 @@
 #include "commission/commission.hpp"
 #include "commission/doctor/log_health.hpp"
 #include "formats/robots/robot_file.hpp"
+#include "tests/doctor/as_found.hpp"
 
 namespace wheelwright::doctor::speeds_test {
 namespace {
@@ -172,25 +173,6 @@ INSTANTIATE_TEST_SUITE_P(Filters, SmoothedSpeeds,
                                          Smoothed{{.kind = kExponential, .time = {0.05, 0.05}}, 200.0},
                                          Smoothed{{.kind = model::SpeedFilterKind::mean, .time = {0.1, 0.1}}, 100.0}));
 
-// The log as every command reads it (results/sound_log.hpp), commissioned.
-commission::Commissioning commissioned(const LogTable& log, Robot read, const LogHealth& health) {
-  for (const LogFinding& found : health.findings) {
-    read.speed_filter = found.speed_filter ? found.speed_filter : read.speed_filter;
-    if (found.id == "time.effort_delay" && found.taken) {
-      read.effort_delay = *found.taken;
-      read.effort_time_origin = model::EffortTimeOrigin::found;
-    }
-    if (found.effort_smoothing) {
-      read.effort_smoothing = *found.effort_smoothing;
-      read.effort_time_origin = model::EffortTimeOrigin::found;
-    }
-  }
-  TableSource source(log);
-  commission::CommissionOptions options;
-  options.at_risk = commission::CommissionOptions::AtRisk::nothing;
-  return commission::commission_robot(source, read, options);
-}
-
 // With and without a model, and never guaranteed without the truth: bounds that hold, or are too small for the filter.
 TEST(Speeds, ThatAreSmoothedBesideDeclaredNoiseAreTheSameToDoctorAndCommission) {
   const double truth[] = {kMass, kInertia, kDrag, kYawDrag};
@@ -210,7 +192,7 @@ TEST(Speeds, ThatAreSmoothedBesideDeclaredNoiseAreTheSameToDoctorAndCommission) 
           read.noise.effort.value = 0.051;
           read.effort_delay = delay;
           const LogHealth health = examine(log, read);
-          const commission::Commissioning result = commissioned(log, read, health);
+          const commission::Commissioning result = testing_support::commissioned_as_found(log, read, health);
           const std::string what = std::to_string(rate) + " Hz, " + std::to_string(time) + " s, ± " +
                                    std::to_string(declared) + '\n' + told(health) + result.message;
           EXPECT_EQ(health.verdict == LogVerdict::commission, result.has_model()) << what;
