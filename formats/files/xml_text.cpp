@@ -18,12 +18,14 @@ bool is_blank(char c) { return kBlanks.find(c) != std::string_view::npos; }
 
 // The five entities of XML and ASCII characters by number; any other stays as it stands.
 std::string decoded(std::string_view text) {
+  constexpr std::size_t kLongestEntity = 6;
   static const std::map<std::string_view, char> known = {
       {"amp", '&'}, {"lt", '<'}, {"gt", '>'}, {"quot", '"'}, {"apos", '\''}};
   std::string out;
   for (std::size_t k = 0; k < text.size(); ++k) {
-    const std::size_t end = text[k] == '&' ? text.find(';', k) : std::string_view::npos;
-    const std::string_view entity = end == std::string_view::npos ? "" : text.substr(k + 1, end - k - 1);
+    const std::string_view behind = text[k] == '&' ? text.substr(k + 1, kLongestEntity + 1) : std::string_view();
+    const std::size_t length = behind.find(';'), end = k + 1 + length;
+    const std::string_view entity = length == std::string_view::npos ? "" : behind.substr(0, length);
     if (const auto found = known.find(entity); found != known.end()) {
       out += found->second;
       k = end;
@@ -291,13 +293,18 @@ std::string XmlText::edited() const {
     }
     std::string inside;
     std::size_t behind = e.open_end;
-    std::string indent = indent_of(e.begin) + "  ";
+    std::optional<std::string> indent;  // looked for where it is needed: a line may hold the whole file
+    const Element* beside = nullptr;
     for (const Id id : e.children) {
       if (!elements_[id].fresh) {
         behind = elements_[id].end;
-        indent = indent_of(elements_[id].begin);
+        beside = &elements_[id];
+        indent.reset();
       } else {
-        inside += line_end_ + indent + written(id, indent);
+        if (!indent) {
+          indent = beside != nullptr ? indent_of(beside->begin) : indent_of(e.begin) + "  ";
+        }
+        inside += line_end_ + *indent + written(id, *indent);
       }
     }
     if (e.closed_at_once && (!inside.empty() || e.new_text)) {

@@ -105,5 +105,24 @@ TEST(XmlText, BrokenFilesAreRefusedOrKept) {
   EXPECT_GT(read, 300);
 }
 
+// Quadratic work would take minutes, which ctest does not wait for.
+TEST(XmlText, WorkGrowsAsTheInputDoes) {
+  std::string line = "<robot>";
+  for (std::size_t k = 0; k < 400000; ++k) {
+    line += "<a/>";
+  }
+  XmlText wide = XmlText::parse(line + "</robot>", "wide.xml");
+  wide.set_attribute(wide.add_child(0, "b"), "name", "c");
+  EXPECT_TRUE(wide.edited().ends_with("<b name=\"c\"/></robot>"));
+  const std::string ampersands(4000000, '&');
+  const XmlText text = XmlText::parse("<robot name='" + ampersands + "'/>", "text.xml");
+  EXPECT_EQ(text.attribute(0, "name"), ampersands);
+}
+
+TEST(XmlText, EntitiesAreReadAsXmlHasThem) {
+  const XmlText text = XmlText::parse("<a b='&lt;&amp;&quot;&apos;&gt;&#65;&#x41;&unknown;&;&amp'/>", "a.xml");
+  EXPECT_EQ(text.attribute(0, "b"), "<&\"'>A&#x41;&unknown;&;&amp");
+}
+
 }  // namespace
 }  // namespace wheelwright::files::xml_text_test
