@@ -347,6 +347,7 @@ void make_directory(const CommonOptions& options, const std::vector<std::string>
   std::vector<std::string> names = files;
   names.emplace_back(kPage);
   for (const std::string& name : names) {
+    files::check_destination(options.out / name);
     if (const std::filesystem::path file = options.out / name; is_there(file)) {
       const std::string other = whose(options, files.front(), name);
       if (!other.empty() && !options.force) {

@@ -536,6 +536,11 @@ Destination destination(const std::filesystem::path& place) {
     }
     file = file.parent_path() / fs::read_symlink(file, error);
   }
+  if (!fs::exists(status) && fs::is_symlink(fs::symlink_status(place, error))) {
+    throw InputError(fmt::format("{}: is a link to {}, which is not there: expected the name of a file to write; take "
+                                 "the link away, or make the file that it leads to",
+                                 place.string(), file.string()));
+  }
   return {file, fs::exists(status) && !fs::is_regular_file(status)};
 }
 
@@ -557,6 +562,8 @@ constexpr const char* suffix = ".wheelwright-part";
 std::filesystem::path with_suffix(std::filesystem::path path) { return path += suffix; }
 
 }  // namespace
+
+void check_destination(const std::filesystem::path& place) { static_cast<void>(destination(place)); }
 
 FileBeside::FileBeside(std::filesystem::path place)
     : place_(std::move(place)),

@@ -112,9 +112,12 @@ class LineReader {
   bool terminated_ = false;
 };
 
+/// Throws InputError where no file can be put at `place`: it is a directory, or a link that leads to nothing.
+void check_destination(const std::filesystem::path& place);
+
 /// A new, empty file beside the place that it is written for, for libraries that write by name. put() renames it; where
 /// that is not reached, nothing is left behind and an older file of the place's name stays as it was. Where the place
-/// is a symbolic link, what it leads to is replaced.
+/// is a symbolic link, what it leads to is replaced; a link that leads to nothing is refused.
 class FileBeside {
  public:
   /// Makes the file. Throws InputError, naming the place, when it cannot be made (no such directory, no right to write,

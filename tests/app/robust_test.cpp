@@ -221,6 +221,20 @@ TEST_F(Robust, OutputGoesIntoPipesAndThroughLinks) {
   EXPECT_EQ(bytes(path("real.csv")), bytes(path("plain.csv")));
 }
 
+TEST_F(Robust, ALinkThatLeadsToNothingIsRefusedBeforeTheWork) {
+  simulate("shipped.yaml", "plain.csv");
+  fs::create_directory(path("found"));
+  for (const char* name : {"model.json", "report.html"}) {
+    fs::create_symlink(path("elsewhere"), path("found") / name);
+    const Outcome outcome = run("commission plain.csv --robot '" + (examples() / "robot.yaml").string() + "' --out found");
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_NE(outcome.err.find("which is not there"), std::string::npos) << outcome.err;
+    EXPECT_FALSE(fs::exists(path("elsewhere")));
+    EXPECT_EQ(std::distance(fs::directory_iterator(path("found")), fs::directory_iterator()), 1);
+    fs::remove(path("found") / name);
+  }
+}
+
 TEST_F(Robust, WhatIsReadIsNotReplaced) {
   fs::copy_file(examples() / "scenarios" / "shipped.yaml", path("drive.yaml"));
   fs::create_hard_link(path("drive.yaml"), path("same.csv"));
