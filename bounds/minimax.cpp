@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <set>
 #include <span>
+#include <tuple>
 
 #include "bounds/certificate.hpp"
 #include "bounds/linear_program.hpp"
@@ -145,7 +147,9 @@ class Epigraph {
           }
         }
         for (HalfSpace& row : chosen) {
-          if (row.a.size() != 0) {
+          // A row of the program that its solution violates is as near as rounding lets it come.
+          if (row.a.size() != 0 &&
+              taken_.insert({row.origin.sample, row.origin.t, row.origin.output, row.origin.side}).second) {
             row.a.conservativeResize(theta_.size() + 1);
             row.a[theta_.size()] = -w;
             added.push_back(std::move(row));
@@ -251,6 +255,8 @@ class Epigraph {
   Coordinates coordinates_;
   std::optional<LinearProgram> program_;
   std::vector<HalfSpace> held_;
+  std::set<std::tuple<std::size_t, double, std::size_t, Side>>
+      taken_;  // sample, t, output, side of rows in the program
   std::vector<double> norms_;
   std::vector<WeightedRow> active_;
   Eigen::VectorXd theta_;

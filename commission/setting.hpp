@@ -39,8 +39,9 @@ struct Setting {
   FilterDesign filter;
   FilterChoice filter_choice;  ///< the curve is empty where the filter was given
   Survey survey;
-  filter::SignalErrors declared;  ///< of the rows, from declared noise only; without error bounds where that is incomplete
-  bool noise_complete = false;    ///< motion and effort are declared
+  filter::SignalErrors
+      declared;  ///< of the rows, from declared noise only; without error bounds where that is incomplete
+  bool noise_complete = false;              ///< motion and effort are declared
   std::optional<MotionNoise> motion_noise;  ///< found by differences; else a limit, declared or from the encoder
   bool commands_are_noisy = false;          ///< logged commands share the noise of the motion: they are no instruments
   Box prior;

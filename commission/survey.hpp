@@ -16,14 +16,14 @@ namespace wheelwright::commission {
 struct Survey {
   std::size_t rows = 0;
   std::size_t segments = 0;
-  double seconds = 0.0;                      ///< driving time, gaps left out
-  double longest_segment = 0.0;              ///< s
-  double median_step = 0.0;                  ///< s
-  double largest_step = 0.0;                 ///< within a segment, s
-  std::size_t losses = 0;                    ///< steps within a segment of 1.5 to 6.5 median ones
-  double losses_scatter = 0.0;               ///< standard deviation of the rows between two losses over their mean: near
-                                             ///< 1 where rows are lost at random, 0 where each n-th step is a long one
-  std::vector<double> largest_speed;         ///< per joint, |speed|, rad/s or m/s
+  double seconds = 0.0;               ///< driving time, gaps left out
+  double longest_segment = 0.0;       ///< s
+  double median_step = 0.0;           ///< s
+  double largest_step = 0.0;          ///< within a segment, s
+  std::size_t losses = 0;             ///< steps within a segment of 1.5 to 6.5 median ones
+  double losses_scatter = 0.0;        ///< standard deviation of the rows between two losses over their mean: near
+                                      ///< 1 where rows are lost at random, 0 where each n-th step is a long one
+  std::vector<double> largest_speed;  ///< per joint, |speed|, rad/s or m/s
   std::vector<double> largest_acceleration;  ///< per joint, over windows of kSurveyWindow steps, rad/s² or m/s²
   std::vector<double> sharpest_change;       ///< per joint, from one step to the next, of the speed over time, noise
                                              ///< and all, rad/s² or m/s²

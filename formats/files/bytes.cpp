@@ -537,9 +537,10 @@ Destination destination(const std::filesystem::path& place) {
     file = file.parent_path() / fs::read_symlink(file, error);
   }
   if (!fs::exists(status) && fs::is_symlink(fs::symlink_status(place, error))) {
-    throw InputError(fmt::format("{}: is a link to {}, which is not there: expected the name of a file to write; take "
-                                 "the link away, or make the file that it leads to",
-                                 place.string(), file.string()));
+    throw InputError(
+        fmt::format("{}: is a link to {}, which is not there: expected the name of a file to write; take "
+                    "the link away, or make the file that it leads to",
+                    place.string(), file.string()));
   }
   return {file, fs::exists(status) && !fs::is_regular_file(status)};
 }

@@ -510,7 +510,8 @@ ElementFilter::EffortWeights ElementFilter::effort_weights() const {
   const bool held = measurement_.hold == Hold::zero_order;
   const bool mean = measurement_.motion == MotionKind::mean_speed;
   const bool between = measurement_.changes == model::EffortChanges::between;
-  if (ranged_ || errors_.interpolates || sharpening_.upper > 0.0 || !corrector_.empty() || measurement_.effort_unsigned || (held && between)) {
+  if (ranged_ || errors_.interpolates || sharpening_.upper > 0.0 || !corrector_.empty() ||
+      measurement_.effort_unsigned || (held && between)) {
     return {};
   }
   const double a = element_.before, b = element_.step;

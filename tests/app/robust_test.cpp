@@ -226,7 +226,8 @@ TEST_F(Robust, ALinkThatLeadsToNothingIsRefusedBeforeTheWork) {
   fs::create_directory(path("found"));
   for (const char* name : {"model.json", "report.html"}) {
     fs::create_symlink(path("elsewhere"), path("found") / name);
-    const Outcome outcome = run("commission plain.csv --robot '" + (examples() / "robot.yaml").string() + "' --out found");
+    const Outcome outcome =
+        run("commission plain.csv --robot '" + (examples() / "robot.yaml").string() + "' --out found");
     EXPECT_EQ(outcome.code, 2);
     EXPECT_NE(outcome.err.find("which is not there"), std::string::npos) << outcome.err;
     EXPECT_FALSE(fs::exists(path("elsewhere")));

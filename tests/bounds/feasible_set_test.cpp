@@ -176,6 +176,28 @@ TEST(Minimax, bound_is_where_the_set_becomes_empty) {
   }
 }
 
+// A vertex of columns that are nearly one is as near as rounding lets it come: rows that it still violates are not
+// asked for without end.
+TEST(Minimax, EndsOnColumnsThatAreNearlyOne) {
+  for (const double apart : {1e-6, 1e-9, 1e-12}) {
+    for (const double noise : {0.0, 0.3}) {
+      for (std::uint64_t seed = 0; seed < 6; ++seed) {
+        Random random(seed);
+        const Rows drawn = simulate(seed, random.vector(4), 600, 0.1, 0.0);
+        RegressionBlock block = drawn.block(0, drawn.instants());
+        block.Y.col(1) = block.Y.col(0) + apart * block.Y.col(1);
+        block.Y.col(3) = block.Y.col(2) - apart * block.Y.col(3);
+        block.dY.setConstant(noise);
+        block.dy.setZero();
+        RegressionTable table(block);
+        const MinimaxFit fit = minimax_fit(table, testing_rows::cube(4, 50.0));
+        EXPECT_LE(fit.lower, fit.upper);
+        EXPECT_LE(fit.upper - fit.lower, 1e-3 * fit.upper) << apart << ", " << noise << ", seed " << seed;
+      }
+    }
+  }
+}
+
 TEST(Minimax, weights_and_declared_bounds_are_units_of_the_answer) {
   const Rows rows = simulate(4, {1.0, 2.0}, 300, 0.1, 0.0);
   RegressionBlock block = rows.block(0, rows.instants());

@@ -25,7 +25,8 @@ Columns honest(std::size_t rows, double rate, double counts, double noise, unsig
       angle[w] += speed / rate;
       const double shown = counts > 0.0 ? std::floor(angle[w] * counts / 6.28) / counts * 6.28 : angle[w];
       c[w].push_back(shown);
-      c[2 + w].push_back(counts > 0.0 ? (shown - before[w]) * rate * (1.0 + measured * normal(random)) : speed + noise * normal(random));
+      c[2 + w].push_back(counts > 0.0 ? (shown - before[w]) * rate * (1.0 + measured * normal(random))
+                                      : speed + noise * normal(random));
       before[w] = shown;
       c[4 + w].push_back(std::cos(0.4 * t) + noise * normal(random));
     }

@@ -127,9 +127,10 @@ TEST(Clocks, StampsThatScatterMuchAreNeverTakenForTrueInSilence) {
       read += clock ? 1 : 0;
       untold += clock ? 0 : 1;
       std::vector<LogFinding> true_ones;
-      EXPECT_FALSE(clock_of(a_log({.step = 0.1, .speeds = true, .speed_noise = noise, .really_uneven = true, .seed = seed},
-                                  scatters(0.075)[0]),
-                            true_ones))
+      EXPECT_FALSE(
+          clock_of(a_log({.step = 0.1, .speeds = true, .speed_noise = noise, .really_uneven = true, .seed = seed},
+                         scatters(0.075)[0]),
+                   true_ones))
           << noise << ", seed " << seed;
     }
   }

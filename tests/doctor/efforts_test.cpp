@@ -382,7 +382,7 @@ void difference(LogTable& log, double count) {
 TEST(Efforts, ThatComeBeforeTheMotionAreTakenInByDoctorWhereCommissionMakesAModelOfThem) {
   std::size_t taken = 0;
   for (const double rate : {100.0, 400.0}) {
-    for (const int early : {0, 1, 4}) {  // rows
+    for (const int early : {0, 1, 4}) {          // rows
       for (const int counts : {0, 256, 1024}) {  // a turn, of angles that are differenced
         LogTable log = drive({.rate = rate, .seconds = 40.0, .effort_noise = 0.1, .seed = 8});
         if (counts > 0) {
