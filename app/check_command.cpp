@@ -32,8 +32,10 @@ constexpr const char* kHelp =
     "wheel radii and yaw gains, or, where the model says that nothing explains the log, that claim. So is what it says "
     "at a stated risk: sums over the log are "
     "taken again, facets and bounds are proved from them, and the parts of the risk are added up. What is proved is "
-    "arithmetic. Not checked: estimates, standard errors, validation, and whether the noise, the prior and the other "
-    "assumptions that the model states are true; they are listed as given, with what commissioning's tests said.";
+    "arithmetic, and that the word guaranteed follows from the noise that the robot file declares and from the tests "
+    "of "
+    "the assumptions. Not checked: estimates, standard errors, validation, and whether the noise, the prior and the "
+    "other assumptions that the model states are true; they are listed as given, with what commissioning's tests said.";
 
 constexpr const char* kExamples =
     "Examples:\n"

@@ -285,6 +285,20 @@ class Awaited final : public files::ByteSource {
   Silence& silence_;
 };
 
+// The `count`-th row that is left out: each of the first, then at 10, 100, 1000, … rows, for a watch of weeks.
+void tell_left_out(const std::string& why, std::size_t count) {
+  constexpr std::size_t kEach = 5;
+  std::size_t ten = 10;
+  while (ten < count) {
+    ten *= 10;
+  }
+  if (count <= kEach) {
+    tell("wheelwright detect: {} (row left out)\n", why);
+  } else if (count == ten) {
+    tell("wheelwright detect: {} (row left out, {} of them by now)\n", why, count);
+  }
+}
+
 // Spells without a decision on the torque residual, with what the parser met in them.
 class Blindness {
  public:
@@ -319,9 +333,11 @@ class Blindness {
       tell(*spell, std::nullopt);
     }
   }
-  void unreadable(const std::string& why) {
+  /// Returns how many lines were unreadable by now.
+  std::size_t unreadable(const std::string& why) {
     unreadable_.first = unreadable_.count++ == 0 ? why : unreadable_.first;
     undecided(std::nullopt);
+    return unreadable_.count;
   }
   [[nodiscard]] bool blind() const { return watch_.blind(); }
   /// Rows at which something was decided.
@@ -524,8 +540,7 @@ ExitCode follow(int stream, TorqueDetector detector, const OnlineModel& model, c
         continue;
       }
     } catch (const InputError& error) {
-      tell("wheelwright detect: {} (row left out)\n", error.what());
-      blindness.unreadable(error.what());
+      tell_left_out(error.what(), blindness.unreadable(error.what()));
       continue;
     }
     silence.row(row.t[0]);

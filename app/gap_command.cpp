@@ -209,6 +209,12 @@ std::vector<SimulatorSource> simulator_sources(const Arguments& a, const Robot& 
     if (!model::on_two_wheels(robot)) {
       throw InputError(fmt::format("{}: {} is no robot on two driven wheels", option, a.robot.string()));
     }
+    if (edited_name(path) == kImproved) {
+      throw InputError(
+          fmt::format("{} {}: its edited file would be {}, which is the improved robot file: expected "
+                      "another name, such as robot.urdf",
+                      option, path.string(), kImproved));
+    }
     SimulatorSource source{format, path, files::read_bytes(path, kLongest)};
     for (const SimulatorSource& other : sources) {
       if (edited_name(other.path) == edited_name(source.path)) {

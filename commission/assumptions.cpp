@@ -21,7 +21,6 @@ using core::Warrant;
 
 namespace {
 
-constexpr const char* kMotionInDriving = "motion_in_driving";
 constexpr const char* kSpeedFilter = "speed_filter";
 
 constexpr double kMostTurning = 1.0;  // on the spot over driving: a mirrored wheel turns the ratio round

@@ -12,6 +12,9 @@ namespace wheelwright::commission {
 
 struct Commissioning;
 
+/// Assumption::id of the one that is about driving to come alone: where it fails, intervals of parameters stand.
+inline constexpr const char* kMotionInDriving = "motion_in_driving";
+
 /// The assumptions of `result` with the verdicts of its log, those of the rows first. The one place where a test sets a
 /// verdict.
 [[nodiscard]] std::vector<core::Assumption> assumptions_of(const Commissioning& result);

@@ -30,8 +30,8 @@ struct Fit {
   std::vector<identify::ExcitationFinding> excitation;  ///< one for each parameter
   std::vector<bool> noise_alone;  ///< p: not excited, since what the column holds is no more than noise of the motion
   Eigen::VectorXd plausible;      ///< per output, largest_plausible_error; empty where noise is declared
-  std::optional<identify::ResidualSummary> watched;  ///< at θ̂, of a detector's rows, where those of the fit interpolate
-                                                     ///< what is lost (loses_often) and noise is not declared
+  std::optional<identify::ResidualSummary> watched;  ///< at θ̂, of a detector's rows, where those of the fit
+                                                     ///< interpolate lost ones (loses_often) and noise is learnt
 };
 
 /// Errors of the rows that are fitted: efforts and motion between samples as most likely, not in the middle of what is

@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include <fmt/format.h>
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
@@ -117,6 +120,31 @@ std::string header_line(const std::vector<std::string>& names) {
   return line;
 }
 
+// `given` as doubles; times of numpy and pandas, of the column of time, as seconds since 1970 or of a span.
+Doubles numbers_of(const py::handle& given, const std::string& name, bool is_time) {
+  const py::array array = py::array::ensure(given);
+  const char kind = array ? array.dtype().kind() : '?';
+  if (is_time && (kind == 'M' || kind == 'm')) {
+    const char* const nanoseconds = kind == 'M' ? "datetime64[ns]" : "timedelta64[ns]";
+    const Doubles whole = Doubles::ensure(array.attr("astype")(nanoseconds).attr("astype")("int64"));
+    Doubles seconds(std::vector<py::ssize_t>(whole.shape(), whole.shape() + whole.ndim()));
+    std::transform(whole.data(), whole.data() + whole.size(), seconds.mutable_data(), [](double at) {
+      constexpr double kNotATime = -9.2e18;
+      return at < kNotATime ? std::numeric_limits<double>::quiet_NaN() : 1e-9 * at;
+    });
+    return seconds;
+  }
+  if (std::string_view("fiubO").find(kind) != std::string_view::npos) {
+    if (Doubles numbers = Doubles::ensure(given)) {
+      return numbers;
+    }
+  }
+  PyErr_Clear();
+  const std::string type = array ? py::str(array.dtype()).cast<std::string>() : "of no array";
+  throw InvalidArgument(fmt::format("column {} of type {}: expected {}", name, type,
+                                    is_time ? "numbers, in s, or times of numpy or pandas" : "real numbers"));
+}
+
 }  // namespace
 
 std::unique_ptr<logs::RecordedLog> array_log(const py::dict& columns, const logs::CsvOptions& options) {
@@ -142,10 +170,7 @@ std::unique_ptr<logs::RecordedLog> array_log(const py::dict& columns, const logs
   });
   Columns out;
   for (const auto& [field, name] : order) {
-    const Doubles array = Doubles::ensure(arrays[field]);
-    if (!array) {
-      throw py::error_already_set();
-    }
+    const Doubles array = numbers_of(arrays[field], given[field], name == "t");
     check_shape(array, {kept->empty() ? -1 : kept->front().size()}, "column " + given[field]);
     if (!kept->empty()) {
       out.names.push_back(name);
@@ -261,8 +286,7 @@ void bind_log(py::module_& m) {
       .def(py::init(&of_arrays), py::arg("columns"), py::arg("robot") = nullptr,
            py::arg("map") = std::map<std::string, std::string>{}, py::arg("extra") = std::vector<std::string>{},
            "A log of numpy columns by name (a dict, or what dict() takes: a pandas.DataFrame does), each of shape "
-           "(rows,), one "
-           "of them the time (s).\n\n"
+           "(rows,), one of them the time (s, or times of numpy or pandas).\n\n"
            "float64 arrays that are contiguous are not copied but kept and read where they lie: leave their contents "
            "alone as long as the log is used. Others are converted. Rows are cleaned as those of a file are: rows with "
            "NaN are dropped, gaps and resets of time begin segments, theta is unwrapped; see notes.\n\n"

@@ -91,6 +91,22 @@ py::object mirror(py::module_& m, const char* name, const py::tuple& bases, cons
   return mirrored;
 }
 
+// What every class of the package derives from.
+PyTypeObject* base_of_all() { return reinterpret_cast<PyTypeObject*>(py::detail::get_internals().instance_base); }
+
+// An object that was never initialised holds no value, and reading it is undefined. `Class.__new__(Class)` is refused
+// by Python itself where a class has a tp_new of its own and the one that is called is its base's.
+void refuse_bare_objects(const py::module_& m) {
+  for (const auto& [name, member] : m.attr("__dict__").cast<py::dict>()) {
+    auto* const type = reinterpret_cast<PyTypeObject*>(member.ptr());
+    if (PyType_Check(member.ptr()) != 0 && type->tp_base == base_of_all()) {
+      type->tp_new = [](PyTypeObject* of, PyObject* arguments, PyObject* named) {
+        return base_of_all()->tp_new(of, arguments, named);
+      };
+    }
+  }
+}
+
 }  // namespace
 
 }  // namespace wheelwright::python
@@ -133,4 +149,5 @@ PYBIND11_MODULE(_core, m) {
   bind_sim(m);
   bind_doctor(m);
   bind_study(m);
+  refuse_bare_objects(m);
 }

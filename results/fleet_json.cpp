@@ -188,7 +188,11 @@ Json prior_json(const study::FleetResult& fleet) {
   return json;
 }
 
-std::string csv_field(const std::string& text) {
+// A spreadsheet computes a cell that begins like a formula; behind an apostrophe it is text.
+std::string csv_field(std::string text) {
+  if (!text.empty() && std::string_view("=+-@\t\r").find(text.front()) != std::string_view::npos) {
+    text.insert(0, "'");
+  }
   if (text.find_first_of(",\"\r\n") == std::string::npos) {
     return text;
   }

@@ -7,9 +7,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "commission/assumptions.hpp"
 #include "commission/at_risk/pose_at_risk.hpp"
 #include "commission/fit.hpp"
+#include "commission/noise_budget.hpp"
 #include "commission/physical.hpp"
+#include "model/filter/noise.hpp"
 #include "model/filter/row_stream.hpp"
 #include "results/assumptions_json.hpp"
 #include "results/model_json.hpp"
@@ -242,6 +245,53 @@ void tell_kinematic_premises(const KinematicClaims& claims, std::vector<std::str
   }
 }
 
+// Whether the word *guaranteed* follows from what the model says of its noise and its assumptions.
+void judge_warrant(const ModelClaims& claims, ModelCheck& result) {
+  if (!claims.guaranteed) {
+    return;
+  }
+  const auto fail = [&](const std::string& why) {
+    result.failures.push_back("the bounds are called guaranteed, but " + why);
+  };
+  for (const core::Assumption& assumption : claims.assumptions) {
+    if (assumption.verdict == core::AssumptionVerdict::fails && assumption.id != commission::kMotionInDriving) {
+      fail(fmt::format("an assumption fails on the log: {}", assumption.statement));
+    }
+  }
+  const commission::NoiseBudget budget = commission::noise_budget(claims.robot, claims.measurement);
+  if (!budget.complete) {
+    fail("the robot file that the model states does not declare the noise of motion and effort");
+    return;
+  }
+  const filter::SignalErrors declared =
+      filter::propagate(claims.model, claims.filter, claims.measurement, budget.sensors);
+  const auto less = [](double stated, double needed) { return stated < needed * (1.0 - 1e-9); };
+  for (std::size_t i = 0; i < claims.model.n(); ++i) {
+    const double stated = claims.errors.output[static_cast<Eigen::Index>(i)];
+    const double needed = declared.output[static_cast<Eigen::Index>(i)];
+    if (claims.origin[i] == core::NoiseOrigin::estimated) {
+      fail(fmt::format("the error of the {} channel is estimated from the log", claims.model.outputs[i]));
+    } else if (less(stated, needed)) {
+      fail(
+          fmt::format("an error of at most {:.4g} {} in the filtered effort, {} channel, is less than the {:.4g} that "
+                      "the declared noise makes",
+                      stated, commission::output_unit(claims.robot, claims.model.output_units[i]),
+                      claims.model.outputs[i], needed));
+    }
+  }
+  const auto smaller = [&](const Eigen::VectorXd& stated, const Eigen::VectorXd& needed) {
+    for (Eigen::Index k = 0; k < needed.size(); ++k) {
+      if (less(k < stated.size() ? stated[k] : 0.0, needed[k])) {
+        return true;
+      }
+    }
+    return false;
+  };
+  if (smaller(claims.errors.acceleration, declared.acceleration) || smaller(claims.errors.speed, declared.speed)) {
+    fail("the errors of the motion that the model states are less than the declared noise makes");
+  }
+}
+
 void tell_premises(const ModelClaims& claims, ModelCheck& result) {
   result.premises.push_back(
       "the prior box, the filter, the measurement and the errors of the motion that the model states");
@@ -291,6 +341,7 @@ ModelCheck check_model(const ModelClaims& claims, LogSource& log, const logs::Lo
   judge_log(claims, data, result);
   judge_prior(claims, result);
   judge_detector(claims, result);
+  judge_warrant(claims, result);
   TorqueRows rows(log, RegressorFilter(commission::without_columns(claims.model, claims.left_out), claims.filter,
                                        claims.measurement, claims.errors));
   SetCheck set = check_set(claims, rows);

@@ -68,6 +68,7 @@ struct SetClaims {
   Box hull;                                  ///< of the set; the prior where it is empty
   std::vector<std::size_t> dropped;          ///< rows left out as outliers
   std::size_t sign_parts = 1;                ///< FeasibleSet::sign_parts
+  bool guaranteed = false;                   ///< the model or one of these bounds is called so
 };
 
 /// Claims about wheel radii and yaw gains.

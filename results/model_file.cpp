@@ -90,6 +90,9 @@ void read_parameters(const JsonPlace& place, SetClaims& claims) {
     }
     claims.lower.push_back({parameter.at("lower").number(), read_proof(samples.at("lower"), claims)});
     claims.upper.push_back({parameter.at("upper").number(), read_proof(samples.at("upper"), claims)});
+    claims.guaranteed =
+        claims.guaranteed ||
+        (parameter.has("warrant") && parameter.at("warrant").text() == core::warrant_word(core::Warrant::guaranteed));
   }
 }
 
@@ -338,6 +341,7 @@ ModelClaims claims_from_json(const Json& json, const std::string& file) {
   read_set(root.at("feasible_set"), claims);
   read_parameters(root.at("parameters"), claims);
   claims.warrant = robots::model_warrant(root);
+  claims.guaranteed = claims.guaranteed || claims.warrant == core::Warrant::guaranteed;
   claims.assumptions = robots::assumptions_at(root);
   if (root.has("physical")) {
     const JsonPlace physical = root.at("physical");

@@ -69,8 +69,12 @@ std::vector<std::string> fields_of(std::string_view line, const std::string& whe
 // Where each of kColumns stands in the header; npos where it is absent.
 std::map<std::string, std::size_t> columns_of(const std::vector<std::string>& header, const std::string& where) {
   std::map<std::string, std::size_t> at;
+  const auto known = [](const std::string& name) { return std::ranges::find(kColumns, name) != kColumns.end(); };
+  if (std::ranges::none_of(header, known)) {  // another file, whose content is nobody's business
+    throw InputError(where + ": no list of robots: expected a header with robot,log and any of when, robot_file, role");
+  }
   for (std::size_t c = 0; c < header.size(); ++c) {
-    if (std::ranges::find(kColumns, header[c]) == kColumns.end()) {
+    if (!known(header[c])) {
       throw InputError(
           fmt::format("{}: unknown column {}: expected a header with robot,log and any of when, robot_file, "
                       "role{}",

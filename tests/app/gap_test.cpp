@@ -169,6 +169,8 @@ TEST_F(Gap, SaysWhatIsWrong) {
   put("robot.xml", "<mujoco>\n<worldbody>\n</mujoco>\n");
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --write-mjcf robot.xml"), HasSubstr("--out"));
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --write-mjcf robot.xml --out x"), HasSubstr("robot.xml:"));
+  EXPECT_THAT(complaint("short.csv --robot robot.yaml --write-urdf robot.yaml --out x"),
+              HasSubstr("robot_improved.yaml"));
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --write-sdf gone.sdf --out x"), HasSubstr("gone.sdf"));
   EXPECT_THAT(complaint("short.csv --robot robot.yaml --left a --right b"), HasSubstr("--write-mjcf"));
 }

@@ -82,6 +82,7 @@ TEST_F(Robust, AStreamThatGoesBlindSaysSinceWhenAndWhy) {
                                 HasSubstr(each.reason)))
         << each.name;
     EXPECT_THAT(text.err, HasSubstr("standard input ended blind since t = ")) << each.name;
+    EXPECT_LE(testing::lines_of(text.err).size(), 12U) << each.name << ": thousands of rows are not told one by one";
     const Outcome json = run("detect --follow --model model/model.json --json", "log.csv");
     const std::vector<std::string> told = testing::lines_of(json.out);
     ASSERT_EQ(told.size(), 1u) << each.name << json.out;
@@ -317,6 +318,21 @@ TEST_F(Robust, AClockThatJumpsByDecadesIsDiagnosed) {
     EXPECT_THAT(Json::parse(outcome.out).at("schema"), "wheelwright/gap/1");
   }
 }
+
+#ifndef __SANITIZE_ADDRESS__
+// Threads without an arena of their own called the system for every allocation, and a command of a second took minutes.
+TEST_F(Robust, WithLittleMemoryACommandEnds) {
+  put_lines("log.csv", healthy_lines());
+  bool done = false;
+  for (const int kilobytes : {60000, 90000, 120000, 150000, 200000, 300000}) {
+    const Outcome outcome = run("commission log.csv --robot robot.yaml --quiet --out " + std::to_string(kilobytes),
+                                "/dev/null", fmt::format("ulimit -t 20; ulimit -v {};", kilobytes));
+    EXPECT_THAT(outcome.code, AnyOf(0, 2, 3, 127)) << kilobytes << ": " << outcome.err;
+    done = done || outcome.code == 0;
+  }
+  EXPECT_TRUE(done);
+}
+#endif
 
 // Half a log without a sensor was "no fault", and nothing said that half of it was not seen.
 TEST_F(Robust, WhatWasNotDecidedOnIsTold) {

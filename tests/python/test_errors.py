@@ -32,6 +32,28 @@ class Errors(unittest.TestCase):
         with self.assertRaisesRegex(ww.InputError, "whel_radius"):
             ww.Robot(whel_radius=0.1, track_width=0.4)
 
+    def test_columns_that_are_no_numbers_are_named(self):
+        t = np.arange(50) * 0.01
+        for bad in (np.array(["a"] * 50), np.array([object()] * 50), t + 1j, ["x"] * 50, t.astype("datetime64[s]"),
+                    np.zeros(50, dtype=[("a", "f8")])):
+            with self.assertRaisesRegex(ww.InvalidArgument, "column omega_r of type .*: expected real numbers"):
+                ww.Log({"t": t, "omega_r": bad})
+
+    def test_times_of_numpy_are_seconds(self):
+        ns = np.arange(50) * 10_000_000
+        for at in (ns.astype("timedelta64[ns]"), np.datetime64("2026-11-30T12:00:00", "ns") + ns.astype("timedelta64[ns]")):
+            log = ww.Log({"t": at, "omega_r": np.arange(50.0)})
+            self.assertAlmostEqual(log.median_step, 0.01, places=6)
+            self.assertEqual(log.segments, 1)
+
+    def test_objects_without_a_value_are_not_made(self):
+        classes = [c for c in vars(ww).values() if isinstance(c, type) and c.__module__.startswith("wheelwright")]
+        bound = [c for c in classes if c.__base__.__name__ == "pybind11_object"]
+        self.assertGreater(len(bound), 30)
+        for c in bound:
+            with self.assertRaises(TypeError):
+                c.__new__(c)
+
     def test_shapes_are_named(self):
         with self.assertRaisesRegex(ww.InvalidArgument, r"omega_r of shape \(9\): expected shape \(10\)"):
             ww.Log({"t": np.arange(10), "omega_r": np.arange(9)})

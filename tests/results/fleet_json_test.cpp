@@ -80,6 +80,9 @@ TEST(FleetJson, CsvHasARowForEachParameter) {
   const std::string rows = fleet_csv_rows(full_record());
   EXPECT_EQ(std::count(rows.begin(), rows.end(), '\n'), 2 + 2) << "the name has a line end of its own, in quotes";
   EXPECT_NE(rows.find("\"a \"\"b\"\", c\nµ\",commissioned,mass,kg,"), std::string::npos) << rows;
+  study::RobotRecord formula = full_record();
+  formula.robot = "=1+1";
+  EXPECT_EQ(fleet_csv_rows(formula).substr(0, 6), "'=1+1,");
   study::RobotRecord empty{.robot = "lost", .dated = false, .commissioning = {}};
   EXPECT_EQ(fleet_csv_rows(empty), "lost,unreadable,,,,,,,,,\n");
   const auto commas = [](const std::string& text) { return std::count(text.begin(), text.end(), ','); };

@@ -257,6 +257,41 @@ TEST_P(TamperedModel, IsRefusedAndItIsSaidWhy) {
 INSTANTIATE_TEST_SUITE_P(Kinds, TamperedModel, ::testing::ValuesIn(tamperings()),
                          [](const auto& each) { return each.param.name; });
 
+// The word follows from the noise that the robot file declares and from the tests of the assumptions.
+TEST_F(CheckAtRisk, BoundsAreCalledGuaranteedWhereThatFollows) {
+  ASSERT_EQ(made_->model.at("warrant"), "guaranteed");
+  const auto called = ::testing::Contains(HasSubstr("called guaranteed, but"));
+  EXPECT_THAT(check(*made_, made_->model).failures, IsEmpty());
+  const auto failures = [&](const std::function<void(Json&)>& change) {
+    Json model = made_->model;
+    change(model);
+    return check(*made_, model).failures;
+  };
+  EXPECT_THAT(failures([](Json& m) {
+                for (Json& sensor : m["robot"]["noise"]) {
+                  sensor = "estimate";
+                }
+              }),
+              called);
+  EXPECT_THAT(failures([](Json& m) { m["robot"]["noise"]["effort"]["bound"] = 4.0; }), called);
+  EXPECT_THAT(failures([](Json& m) { m["noise"]["outputs"][0]["origin"] = "estimated"; }), called);
+  EXPECT_THAT(failures([](Json& m) { scale(m["noise"]["outputs"][0]["learning"], 0.5); }), called);
+  for (std::size_t k = 0; k < made_->model.at("assumptions").size(); ++k) {
+    const bool driving = made_->model.at("assumptions")[k].at("id") == "motion_in_driving";
+    const auto said = failures([&](Json& m) { m["assumptions"][k]["verdict"] = "fails"; });
+    EXPECT_THAT(said, driving ? ::testing::Matcher<const std::vector<std::string>&>(::testing::Not(called)) : called);
+  }
+  // What is called less than it could be is no false claim.
+  EXPECT_THAT(failures([](Json& m) {
+                m["warrant"] = "extrapolated";
+                for (Json& p : m["parameters"]) {
+                  p["warrant"] = "extrapolated";
+                }
+                m["assumptions"][0]["verdict"] = "fails";
+              }),
+              ::testing::Not(called));
+}
+
 // Narrower thresholds than the proof's noise would promise what was never proved; wider ones promise less.
 TEST_F(CheckAtRisk, ADetectorWithSmallerErrorsThanTheProofIsNotProved) {
   const Json::json_pointer output("/detector/error_bounds/output/0");

@@ -92,6 +92,7 @@ TEST_F(FleetList, ErrorsNameTheLine) {
   EXPECT_THAT(error("robot,logs\n"), HasSubstr("fleet.csv:1: unknown column 'logs'"));
   EXPECT_THAT(error("robot,logs\n"), HasSubstr("did you mean 'log'"));
   EXPECT_THAT(error("robot,when\n"), HasSubstr("log is missing"));
+  EXPECT_THAT(error("root:x:0:0:root:/root:/bin/sh\n"), ::testing::Not(HasSubstr("root:x")));
   EXPECT_THAT(error("robot,log,log\n"), HasSubstr("stands twice"));
   EXPECT_THAT(error("robot,log\n\namy\n"), HasSubstr("fleet.csv:3: 1 fields: expected 2"));
   EXPECT_THAT(error("robot,log\n,a.csv\n"), HasSubstr("fleet.csv:2: robot is empty"));
