@@ -22,6 +22,7 @@ struct EventIsolationOptions {
   detector::IsolationOptions isolation{};
   detector::SumIsolationOptions sums{};  ///< where the model says something at a stated risk
   std::size_t most_events = 8;           ///< the first ones; the others are left alone
+  std::vector<std::string> only{};       ///< faults that are asked about, by their names; empty: all
 };
 
 /// How long before the window of an isolation rows have to begin, s.

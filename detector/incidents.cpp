@@ -140,6 +140,15 @@ bool IncidentRecorder::asks(const Event& event) const {
          event.alarm - open_->last_examined >= options_.patience * (event.alarm - open_->alarm);
 }
 
+bool IncidentRecorder::goes_on(const Event& event, const Isolation& isolation) const {
+  if (!open_) {
+    return false;
+  }
+  const Candidates found = consistent_of(isolation, event.alarm);
+  const bool soon = open_->examined == 0 || event.start - open_->end <= options_.quiet;
+  return !common(open_->candidates, found, false).empty() || (soon && !common(open_->candidates, found, true).empty());
+}
+
 // The candidates after an event that was examined; another incident is opened where it is of another fault.
 IncidentRecorder::Outcome IncidentRecorder::take(const Event& event, const Isolation& isolation) {
   Candidates found = consistent_of(isolation, event.alarm);

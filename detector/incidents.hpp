@@ -93,6 +93,9 @@ class IncidentRecorder {
   explicit IncidentRecorder(IncidentOptions options = {}) : options_(options) {}
   /// Whether an event with this alarm should be isolated before it is added.
   [[nodiscard]] bool asks(const Event& event) const;
+  /// True if a candidate of the open incident is among those of `isolation` in a way that the event belongs to the
+  /// incident by. What add() does then does not depend on what `isolation` says of faults that are no candidates.
+  [[nodiscard]] bool goes_on(const Event& event, const Isolation& isolation) const;
   /// Takes the next event, with its isolation where there is one; `asked` is false where asks() was, or where the event
   /// cannot be isolated.
   Outcome add(const Event& event, const Isolation* isolation, bool asked = true);

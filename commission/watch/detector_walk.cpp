@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -303,17 +304,21 @@ Faults not_excluded(const detector::Isolation& isolation, const Wanted& wanted) 
 }
 
 // By both residuals. The one that shows something is asked first, since it excludes most, the other about what is left.
+// What a fault that is not `wanted` is said to be is not looked at.
 detector::Isolation isolate_piece(LogSource& piece, const OnlineModel& model, const RegressorFilter& filter,
-                                  const Polytope& set, const Faults& faults, const detector::Event& event,
-                                  const detector::IsolationOptions& options) {
+                                  const Polytope& set, const Faults& faults, const std::vector<std::string>& only,
+                                  const detector::Event& event, const detector::IsolationOptions& options) {
   const detector::ReferenceMotion motion = detector::read_reference(piece, filter);
+  const auto wanted = [&](const FaultType& fault) { return only.empty() || std::ranges::count(only, fault.name) > 0; };
+  Faults asked;
+  std::ranges::copy_if(faults, std::back_inserter(asked), wanted);
   const auto by_torque = [&](const Faults& some) {
     const bool covered = motion.instants() > 0 && motion.t.back() >= event.alarm;
     return findings_on(faults, covered ? detector::isolate(motion, filter, set, some, event.start, event.alarm, options)
                                        : detector::Isolation{});
   };
   if (!model.kinematic || !has_columns(piece, model.kinematic->measurement.columns())) {
-    return by_torque(faults);
+    return by_torque(asked);
   }
   const detector::KinematicModel& kinematic = *model.kinematic;
   const detector::OdometryReference reference =
@@ -327,20 +332,26 @@ detector::Isolation isolate_piece(LogSource& piece, const OnlineModel& model, co
   const auto shows = [](const FaultType& fault) { return detector::shows_in_odometry(fault); };
   Faults hidden, moving;
   for (const FaultType& fault : faults) {
-    (shows(fault) ? moving : hidden).push_back(fault);
+    if (!shows(fault)) {
+      hidden.push_back(fault);
+    } else if (wanted(fault)) {
+      moving.push_back(fault);
+    }
   }
   const double slack = model.measurement.nominal_step + kinematic.measurement.nominal_step;
   detector::Isolation out = by_odometry(hidden);
   if (out.count(Verdict::excluded) > 0) {
     detector::narrow_by(out, by_odometry(moving), slack);
-    const Faults left = not_excluded(out, [](const FaultType&) { return true; });
+    const Faults left = not_excluded(out, wanted);
     detector::Isolation torque = by_torque(left);
     detector::narrow_by(torque, out, slack);
     return torque;
   }
-  detector::Isolation torque = by_torque(faults);
+  detector::Isolation torque = by_torque(asked);
   detector::narrow_by(torque, out, slack);
-  detector::narrow_by(torque, by_odometry(not_excluded(torque, shows)), slack);
+  detector::narrow_by(
+      torque, by_odometry(not_excluded(torque, [&](const FaultType& fault) { return shows(fault) && wanted(fault); })),
+      slack);
   return torque;
 }
 
@@ -374,8 +385,16 @@ std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineMode
   std::vector<detector::Isolation> out;
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     TableSource source(pieces[k].table);
-    out.push_back(isolate_piece(source, model, filter, set, faults, events[k], options.isolation));
-    if (!model.at_risk) {
+    out.push_back(isolate_piece(source, model, filter, set, faults, options.only, events[k], options.isolation));
+    for (detector::FaultFinding& finding : out.back().findings) {
+      if (!options.only.empty() && std::ranges::count(options.only, finding.fault.name) == 0) {
+        finding.verdict = Verdict::not_examined;
+      }
+    }
+    const bool dated = std::ranges::any_of(out.back().findings, [](const detector::FaultFinding& finding) {
+      return finding.verdict == Verdict::consistent && !finding.earlier;
+    });
+    if (!model.at_risk || !dated) {  // sums narrow nothing else
       continue;
     }
     TableSource around(longer[k].table);

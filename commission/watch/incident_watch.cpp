@@ -15,6 +15,22 @@ detector::Isolation isolate_one(LogSource& log, const OnlineModel& model, const 
   return isolate_events(log, model, std::span(&event, 1), options).front();
 }
 
+// About the open incident's candidates first: the other faults are asked about only where the event is another one's.
+detector::Isolation isolate_next(LogSource& log, const OnlineModel& model, const detector::Event& event,
+                                 const detector::IncidentRecorder& recorder, const EventIsolationOptions& options) {
+  if (recorder.open() && !recorder.open()->candidates.empty()) {
+    EventIsolationOptions some = options;
+    for (const detector::IncidentCandidate& candidate : recorder.open()->candidates) {
+      some.only.push_back(candidate.finding.fault.name);
+    }
+    detector::Isolation isolation = isolate_one(log, model, event, some);
+    if (recorder.goes_on(event, isolation)) {
+      return isolation;
+    }
+  }
+  return isolate_one(log, model, event, options);
+}
+
 }  // namespace
 
 std::vector<detector::Incident> join_events(LogSource& log, const OnlineModel& model, const Detection& detection,
@@ -41,7 +57,7 @@ std::vector<detector::Incident> join_events(LogSource& log, const OnlineModel& m
     const bool asked = known || recorder.asks(*next.event);
     std::optional<detector::Isolation> own;
     if (asked && !known) {
-      own = isolate_one(log, model, *next.event, options);
+      own = isolate_next(log, model, *next.event, recorder, options);
     }
     auto outcome = recorder.add(*next.event, known ? &isolations[*next.torque] : own ? &*own : nullptr, asked);
     if (outcome.closed) {
@@ -108,7 +124,7 @@ std::vector<IncidentWatch::Told> IncidentWatch::settle(bool all) {
       if (last != rows_.t.rend()) {
         event.start_sample = static_cast<std::size_t>(rows_.t.rend() - last) - 1;
         TableSource log(rows_);
-        isolation = isolate_one(log, model_, event, options_);
+        isolation = isolate_next(log, model_, event, recorder_, options_);
       }
     }
     auto outcome = recorder_.add(event, isolation ? &*isolation : nullptr, asked);

@@ -603,13 +603,8 @@ double FaultFilter::most_added(const FaultSignals& signals) const {
   return sum.maxCoeff();
 }
 
-FaultSignals FaultFilter::state(const double* (filter::KernelBank::*part)() const) const {
-  FaultSignals out = FaultSignals::none(*model_);
-  fill(out, (cascades_.*part)());
-  return out;
-}
-
-bool FaultFilter::next() {
+// The next element through the filter of the signature.
+bool FaultFilter::pass_element() {
   if (!elements_.next()) {
     return false;
   }
@@ -620,6 +615,23 @@ bool FaultFilter::next() {
     cascades_.cut(static_cast<std::size_t>(3 * begin.g1.size() + begin.c.size()));
   }
   filter(begin, end, {held * shares[0], held * shares[1]}, motion_->step[k_ + 1]);
+  return true;
+}
+
+bool FaultFilter::next_state() {
+  if (!pass_element()) {
+    return false;
+  }
+  ++k_;
+  return true;
+}
+
+bool FaultFilter::next() {
+  if (!pass_element()) {
+    return false;
+  }
+  const std::array<double, 2>& shares = elements_.shares();
+  const FaultSignals &begin = elements_.at_begin(), &end = elements_.at_end();
   widen(begin, end, k_ == onset_ || elements_.sets_in(), std::max(shares[0] + shares[1], motion_->step[k_ + 1]));
   ++k_;
   const auto n = static_cast<Eigen::Index>(model_->n());

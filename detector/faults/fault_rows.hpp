@@ -204,11 +204,16 @@ class FaultFilter final : public FaultRows {
   bool next() override;
   [[nodiscard]] std::size_t instant() const override { return k_; }
   [[nodiscard]] FaultRow row(std::size_t i) const override;
-  /// What the filter remembers of each signal: `part` of a KernelState, from a bank of them.
-  [[nodiscard]] FaultSignals state(const double* (filter::KernelBank::*part)() const) const;
+  /// The same as next() for who asks for bank() and filtered() only: nothing of what row() says of errors is kept up.
+  bool next_state();
+  /// What the filter remembers of each signal: entries of g1, g2, s and c, one after the other, row by row.
+  [[nodiscard]] const filter::KernelBank& bank() const { return cascades_; }
+  /// The filtered signature at this instant.
+  [[nodiscard]] const FaultSignals& filtered() const { return filtered_; }
 
  private:
   void begin_filter(std::size_t onset);
+  bool pass_element();
   void filter(const FaultSignals& begin, const FaultSignals& end, const std::array<double, 2>& shares, double h);
   [[nodiscard]] double most_added(const FaultSignals& signals) const;
   void widen(const FaultSignals& begin, const FaultSignals& end, bool sets_in, double h);

@@ -145,7 +145,7 @@ class Search {
 
   void place(std::size_t a, std::size_t b) {
     rows_->between(a, b);
-    data_.clear();
+    std::size_t count = 0;
     const std::size_t keep = a > in_.window.first ? a - 1 : a;
     for (const std::size_t k : in_.window.rows) {
       const bool faulty = k > rows_->start();
@@ -153,9 +153,19 @@ class Search {
         continue;
       }
       for (std::size_t i = 0; i < n_; ++i) {
-        data_.push_back({static_cast<Eigen::Index>(k * n_ + i), i, faulty, faulty ? rows_->row(k, i) : OnsetRow{}});
+        if (count == data_.size()) {
+          data_.emplace_back();
+        }
+        Row& row = data_[count++];
+        row.at = static_cast<Eigen::Index>(k * n_ + i);
+        row.output = i;
+        row.faulty = faulty;
+        if (faulty) {
+          rows_->row(k, i, row.part);
+        }
       }
     }
+    data_.resize(count);
   }
 
   [[nodiscard]] bool spent() {

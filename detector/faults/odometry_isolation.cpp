@@ -132,7 +132,7 @@ class OdometryOnsetRows final : public HypothesisRows {
   [[nodiscard]] std::size_t start() const override { return s_; }
   [[nodiscard]] bool encoder() const override { return encoder_; }
 
-  [[nodiscard]] OnsetRow row(std::size_t k, std::size_t i) override {
+  void row(std::size_t k, std::size_t i, OnsetRow& out) override {
     check::that(k > s_ && k < end_, "instant", "one after the onset");
     const ReferenceMotion& motion = reference_->motion;
     const std::size_t window = std::max(reference_->window[k], first_);
@@ -145,8 +145,11 @@ class OdometryOnsetRows final : public HypothesisRows {
       const WaySums part = doubt;
       doubt.add(uncertain_ - 1.0, part);
     }
-    OnsetRow out;
-    out.e0 = out.g1 = out.g2 = out.e1 = out.e2 = Eigen::RowVectorXd::Zero(p_);
+    for (Eigen::RowVectorXd* part : {&out.e0, &out.g1, &out.g2, &out.e1, &out.e2}) {
+      part->setZero(p_);
+    }
+    out.c = out.ec = 0.0;
+    out.left = {};
     write(signature, doubt, motion.heading[reference_->window[k]], i, out);
     const auto at = static_cast<Eigen::Index>(k * n_ + i);
     out.e1.array() += share_ * motion.rows.dY.row(at).maxCoeff();
@@ -156,7 +159,6 @@ class OdometryOnsetRows final : public HypothesisRows {
     if (measurement_->position && i < 2) {
       out.ec += within_[k - first_] - within_[doubtful - first_];
     }
-    return out;
   }
 
  private:
@@ -311,9 +313,10 @@ Eigen::MatrixXd odometry_responses(const OdometryReference& reference, const Mod
       continue;
     }
     rows.between(start - 2, start - 1);
+    OnsetRow row;
     for (std::size_t r = 0; r < instants.size(); ++r) {
       for (Eigen::Index i = 0; i < outputs && instants[r] > start; ++i) {
-        const OnsetRow row = rows.row(instants[r], static_cast<std::size_t>(i));
+        rows.row(instants[r], static_cast<std::size_t>(i), row);
         out(static_cast<Eigen::Index>(r) * outputs + i, static_cast<Eigen::Index>(c)) = row.g1.dot(theta) + row.c;
       }
     }

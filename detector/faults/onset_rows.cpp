@@ -3,22 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "core/check.hpp"
 
 namespace wheelwright::detector {
 namespace {
-
-// x + f y, part by part.
-FaultSignals sum(const FaultSignals& x, double f, const FaultSignals& y) {
-  return {x.g1 + f * y.g1, x.g2 + f * y.g2, x.s, x.c + f * y.c};
-}
-
-void raise(FaultSignals& to, const FaultSignals& from) {
-  to.g1 = to.g1.cwiseMax(from.g1.cwiseAbs());
-  to.g2 = to.g2.cwiseMax(from.g2.cwiseAbs());
-  to.c = to.c.cwiseMax(from.c.cwiseAbs());
-}
 
 bool drifts(const FaultType& fault) { return fault.profile.kind == FaultProfile::Kind::ramp; }
 
@@ -66,9 +56,10 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
       motion_(&motion),
       first_(first),
       end_(end),
+      entries_(model.n() * model.p()),
+      width_(2 * entries_ + model.n()),
       gain_(std::pow(design.alpha, design.order)),
-      bound_{FaultSignals::none(model), FaultSignals::none(model), FaultSignals::none(model),
-             FaultSignals::none(model)} {
+      bound_(parts * width_, 0.0) {
   check::that(knows(fault, model), "fault '" + fault.name + "'", "a step or a drift");
   check::that(first < end && end <= motion.instants(), "instants", "a range of the motion");
   fault_.held_effort = false;
@@ -81,116 +72,154 @@ OnsetRows::OnsetRows(const FaultType& fault, const Model& model, const FilterDes
   if (!motion.cuts.empty()) {
     kernel_.soften();
   }
-  state_.assign(end - first, bound_);
-  state_[0].z1.g1 = state_[0].fast.g1 = state_[0].soft.g1 = jump(first);
+  find_jumps();
+  states_.assign((end - first) * parts * width_, 0.0);
+  for (const Part part : {z1, fast, soft}) {
+    std::copy_n(jump(first), entries_, states_.begin() + static_cast<std::ptrdiff_t>(part * width_));
+  }
+  left_.resize(parts * width_);
+  before_.resize(parts * width_);
+  filtered_.resize(width_);
   take(step_);
 }
 
 void OnsetRows::take(const FaultType& fault) {
   FaultFilter filter(fault, *model_, design_, *motion_);
   filter.begin(first_);
-  while (filter.instant() + 1 < end_ && filter.next()) {
-    state_[filter.instant() - first_] = {filter.state(&filter::KernelBank::z1), filter.state(&filter::KernelBank::z2),
-                                         filter.state(&filter::KernelBank::fast),
-                                         filter.state(&filter::KernelBank::soft)};
+  double* out = states_.data();
+  const std::size_t n = model_->n();
+  while (filter.instant() + 1 < end_ && filter.next_state()) {
+    out = states_.data() + (filter.instant() - first_) * parts * width_;
+    for (const double* from : {filter.bank().z1(), filter.bank().z2(), filter.bank().fast(), filter.bank().soft()}) {
+      std::copy_n(from, 2 * entries_, out);
+      std::copy_n(from + 3 * entries_, n, out + 2 * entries_);
+      out += width_;
+    }
   }
 }
 
-// The impulse that motion beyond v has where a step sets in, as far as rows hold it.
-core::RowMatrix OnsetRows::jump(std::size_t k) const {
-  Eigen::VectorXd moved = Eigen::VectorXd::Zero(motion_->speed.rows());
-  if (fault_.motion.size() > 0) {
-    moved += fault_.motion * motion_->speed.col(static_cast<Eigen::Index>(k));
+// The impulses that motion beyond v has where a step sets in, as far as rows hold it.
+void OnsetRows::find_jumps() {
+  jumps_.assign((end_ - first_) * entries_, 0.0);
+  if (fault_.motion.size() == 0 && fault_.slip.size() == 0) {
+    return;
   }
-  if (fault_.slip.size() > 0) {
-    moved += fault_.slip;
-  }
-  core::RowMatrix out = FaultSignals::none(*model_).g1;
-  for (const Term& term : model_->terms) {
-    if (term.kind == Term::Kind::acceleration) {
-      out(static_cast<Eigen::Index>(term.output), static_cast<Eigen::Index>(term.parameter)) +=
-          motion_->held_jump(k) * term.scale * moved[static_cast<Eigen::Index>(term.coordinate)];
+  Eigen::VectorXd moved(motion_->speed.rows());
+  for (std::size_t k = first_; k < end_; ++k) {
+    moved.setZero();
+    if (fault_.motion.size() > 0) {
+      moved.noalias() += fault_.motion * motion_->speed.col(static_cast<Eigen::Index>(k));
+    }
+    if (fault_.slip.size() > 0) {
+      moved += fault_.slip;
+    }
+    double* out = jumps_.data() + (k - first_) * entries_;
+    for (const Term& term : model_->terms) {
+      if (term.kind == Term::Kind::acceleration) {
+        out[term.output * model_->p() + term.parameter] +=
+            motion_->held_jump(k) * term.scale * moved[static_cast<Eigen::Index>(term.coordinate)];
+      }
     }
   }
-  return out;
 }
 
 // What is left at instant `to` of a state at instant `from`.
-void OnsetRows::pass(State& state, std::size_t from, std::size_t to) const {
+void OnsetRows::pass(std::vector<double>& state, std::size_t from, std::size_t to) const {
+  double *slow1 = state.data() + z1 * width_, *slow2 = state.data() + z2 * width_,
+         *quick = state.data() + fast * width_, *cut = state.data() + soft * width_;
   while (from < to) {
     if (motion_->cut_at(from)) {
-      state.z1 = sum(state.z1, -1.0, state.soft);
-      state.fast = sum(state.fast, -1.0, state.soft);
-      state.soft = FaultSignals::none(*model_);
+      for (std::size_t e = 0; e < width_; ++e) {
+        slow1[e] -= cut[e];
+        quick[e] -= cut[e];
+        cut[e] = 0.0;
+      }
     }
     std::size_t end = motion_->cuts.empty() ? to : from + 1;
     while (end < to && !motion_->cut_at(end)) {
       ++end;
     }
-    const double x = way(from, end), decay = std::exp(-design_.beta * x);
-    const FaultSignals none = FaultSignals::none(*model_);
-    state.z2 = sum(sum(none, decay, state.z2), decay * x, state.z1);
-    state.z1 = sum(none, decay, state.z1);
-    state.fast = sum(none, std::exp(-kernel_.gamma() * x), state.fast);
-    state.soft = sum(none, std::exp(-kernel_.lambda() * x), state.soft);
+    const double x = way(from, end), decay = std::exp(-design_.beta * x), shift = decay * x;
+    const double fades = std::exp(-kernel_.gamma() * x), softens = std::exp(-kernel_.lambda() * x);
+    for (std::size_t e = 0; e < width_; ++e) {
+      slow2[e] = decay * slow2[e] + shift * slow1[e];
+      slow1[e] *= decay;
+      quick[e] *= fades;
+      cut[e] *= softens;
+    }
     from = end;
   }
 }
 
 // The state at instant `at` of a step that set in at `from`.
-OnsetRows::State OnsetRows::left(std::size_t from, std::size_t at) const {
-  const State& now = state_[at - first_];
-  State before = state_[from - first_];
-  const core::RowMatrix impulse = jump(from);
-  before.z1.g1 -= impulse;
-  before.fast.g1 -= impulse;
-  if (!motion_->cuts.empty()) {
-    before.soft.g1 -= impulse;
-    pass(before, from, at);
-    return {sum(now.z1, -1.0, before.z1), sum(now.z2, -1.0, before.z2), sum(now.fast, -1.0, before.fast),
-            sum(now.soft, -1.0, before.soft)};
+void OnsetRows::left(std::size_t from, std::size_t at, std::vector<double>& out) {
+  const double *now = state(at), *impulse = jump(from);
+  std::copy_n(state(from), before_.size(), before_.begin());
+  double *slow1 = before_.data() + z1 * width_, *slow2 = before_.data() + z2 * width_,
+         *quick = before_.data() + fast * width_, *cut = before_.data() + soft * width_;
+  const bool cuts = !motion_->cuts.empty();
+  for (std::size_t e = 0; e < entries_; ++e) {
+    slow1[e] -= impulse[e];
+    quick[e] -= impulse[e];
+    cut[e] -= cuts ? impulse[e] : 0.0;
   }
-  const double x = way(from, at), decay = std::exp(-design_.beta * x);
-  return {sum(now.z1, -decay, before.z1), sum(sum(now.z2, -decay, before.z2), -decay * x, before.z1),
-          sum(now.fast, -std::exp(-kernel_.gamma() * x), before.fast), now.soft};
+  if (cuts) {
+    pass(before_, from, at);
+    for (std::size_t e = 0; e < out.size(); ++e) {
+      out[e] = now[e] - before_[e];
+    }
+    return;
+  }
+  const double x = way(from, at), decay = std::exp(-design_.beta * x), shift = -decay * x;
+  const double fades = std::exp(-kernel_.gamma() * x);
+  for (std::size_t e = 0; e < width_; ++e) {
+    out[z1 * width_ + e] = now[z1 * width_ + e] - decay * slow1[e];
+    out[z2 * width_ + e] = (now[z2 * width_ + e] - decay * slow2[e]) + shift * slow1[e];
+    out[fast * width_ + e] = now[fast * width_ + e] - fades * quick[e];
+    out[soft * width_ + e] = now[soft * width_ + e];
+  }
 }
 
 // The same of a fault that was there before first_: nothing jumps.
-OnsetRows::State OnsetRows::broken(std::size_t at) const {
-  const FaultSignals none = FaultSignals::none(*model_);
-  State impulse{none, none, none, none};
-  impulse.z1.g1 = impulse.fast.g1 = jump(first_);
-  if (!motion_->cuts.empty()) {
-    impulse.soft.g1 = impulse.z1.g1;
+void OnsetRows::broken(std::size_t at, std::vector<double>& out) {
+  std::ranges::fill(before_, 0.0);
+  for (const Part part : {z1, fast, soft}) {
+    if (part != soft || !motion_->cuts.empty()) {
+      std::copy_n(jump(first_), entries_, before_.begin() + static_cast<std::ptrdiff_t>(part * width_));
+    }
   }
-  pass(impulse, first_, at);
-  const State& now = state_[at - first_];
-  return {sum(now.z1, -1.0, impulse.z1), sum(now.z2, -1.0, impulse.z2), sum(now.fast, -1.0, impulse.fast),
-          sum(now.soft, -1.0, impulse.soft)};
+  pass(before_, first_, at);
+  const double* now = state(at);
+  for (std::size_t e = 0; e < out.size(); ++e) {
+    out[e] = now[e] - before_[e];
+  }
 }
 
 void OnsetRows::between(std::size_t a, std::size_t b) {
   check::that(a >= first_ && a < b && b + 1 < end_, "onset", "instants of the motion");
   s_ = b + 1;
+  filtered_at_ = 0;
   errors_.begin(s_);
-  const FaultSignals none = FaultSignals::none(*model_);
-  bound_ = {none, none, none, none};
+  std::ranges::fill(bound_, 0.0);
   const std::size_t from = a > first_ ? a - 1 : a;
-  const core::RowMatrix counted = jump(s_);
-  const auto hold = [&](State state) {
-    state.z1.g1 -= counted;
-    state.fast.g1 -= counted;
-    state.soft.g1 -= counted;
-    raise(bound_.soft, state.soft);
-    raise(bound_.z1, state.z1);
-    raise(bound_.z2, state.z2);
-    raise(bound_.fast, state.fast);
+  const double* counted = jump(s_);
+  const auto hold = [&] {
+    for (const Part part : {z1, fast, soft}) {
+      for (std::size_t e = 0; e < entries_; ++e) {
+        left_[part * width_ + e] -= counted[e];
+      }
+    }
+    for (std::size_t e = 0; e < bound_.size(); ++e) {
+      bound_[e] = std::max(bound_[e], std::abs(left_[e]));
+    }
   };
   for (std::size_t k = from; k <= s_; ++k) {
-    hold(left(k, s_));
+    left(k, s_, left_);
+    hold();
   }
   if (a == first_) {
-    hold(broken(s_));
+    broken(s_, left_);
+    hold();
   }
   // The speed's own error in the impulse.
   Eigen::VectorXd error = Eigen::VectorXd::Zero(motion_->speed.rows());
@@ -199,92 +228,100 @@ void OnsetRows::between(std::size_t a, std::size_t b) {
   }
   for (const Term& term : model_->terms) {
     if (term.kind == Term::Kind::acceleration) {
-      const auto i = static_cast<Eigen::Index>(term.output), j = static_cast<Eigen::Index>(term.parameter);
       const double by = std::abs(term.scale) * error[static_cast<Eigen::Index>(term.coordinate)];
-      bound_.z1.g1(i, j) += by;
-      bound_.fast.g1(i, j) += by;
-      bound_.soft.g1(i, j) += by;
+      for (const Part part : {z1, fast, soft}) {
+        bound_[part * width_ + term.output * model_->p() + term.parameter] += by;
+      }
     }
   }
   if (drifts(fault_)) {
     uncertain_ = std::min(1.0, (motion_->instant[s_] - motion_->instant[from]) / fault_.profile.rise);
-    for (FaultSignals* part : {&bound_.z1, &bound_.z2, &bound_.fast, &bound_.soft}) {
-      part->g1 *= uncertain_;
-      part->g2 *= uncertain_;
-      part->c *= uncertain_;
+    for (double& bound : bound_) {
+      bound *= uncertain_;
     }
-    drifting_.assign(end_ - s_, FaultSignals::none(*model_));
+    drifting_.assign((end_ - s_) * width_, 0.0);
     FaultFilter filter(fault_, *model_, design_, *motion_);
     filter.begin(s_);
-    while (filter.instant() + 1 < end_ && filter.next()) {
-      FaultSignals& out = drifting_[filter.instant() - s_];
-      for (std::size_t i = 0; i < model_->n(); ++i) {
-        const FaultRow row = filter.row(i);
-        const auto at = static_cast<Eigen::Index>(i), p = static_cast<Eigen::Index>(row.g1.size());
-        out.g1.row(at) = Eigen::Map<const Eigen::RowVectorXd>(row.g1.data(), p);
-        out.g2.row(at) = Eigen::Map<const Eigen::RowVectorXd>(row.g2.data(), p);
-        out.c[at] = row.c;
-      }
+    while (filter.instant() + 1 < end_ && filter.next_state()) {
+      double* out = drifting_.data() + (filter.instant() - s_) * width_;
+      const FaultSignals& signals = filter.filtered();
+      std::copy_n(signals.g1.data(), entries_, out);
+      std::copy_n(signals.g2.data(), entries_, out + entries_);
+      std::copy_n(signals.c.data(), signals.c.size(), out + 2 * entries_);
     }
   }
 }
 
 // Filtered, of a step that sets in at s_.
-FaultSignals OnsetRows::filtered(std::size_t k) const {
-  const State state = left(s_, k);
+void OnsetRows::filter_at(std::size_t k) {
+  if (k == filtered_at_) {
+    return;
+  }
+  filtered_at_ = k;
+  left(s_, k, left_);
+  const double *slow1 = left_.data() + z1 * width_, *slow2 = left_.data() + z2 * width_,
+               *rapid = left_.data() + fast * width_;
   if (design_.order == 1) {
-    return {gain_ * state.z1.g1, gain_ * state.z1.g2, state.z1.s, gain_ * state.z1.c};
+    for (std::size_t e = 0; e < width_; ++e) {
+      filtered_[e] = gain_ * slow1[e];
+    }
+    return;
   }
   const double slow = gain_ * kernel_.slow(), quick = slow * kernel_.apart();
-  const auto value = [&](const auto& z1, const auto& z2, const auto& fast) { return slow * z2 - quick * (z1 - fast); };
-  return {value(state.z1.g1, state.z2.g1, state.fast.g1), value(state.z1.g2, state.z2.g2, state.fast.g2), state.z1.s,
-          value(state.z1.c, state.z2.c, state.fast.c)};
+  for (std::size_t e = 0; e < width_; ++e) {
+    filtered_[e] = slow * slow2[e] - quick * (slow1[e] - rapid[e]);
+  }
 }
 
-OnsetRow OnsetRows::row(std::size_t k, std::size_t i) {
+void OnsetRows::row(std::size_t k, std::size_t i, OnsetRow& out) {
   check::that(k > s_ && k < end_, "instant", "one after the onset");
-  const auto at = static_cast<Eigen::Index>(i), p = static_cast<Eigen::Index>(model_->p());
-  const FaultSignals step = filtered(k);
-  const FaultSignals& signals = drifts(fault_) ? drifting_[k - s_] : step;
+  using Entries = Eigen::Map<const Eigen::RowVectorXd>;
+  const auto p = static_cast<Eigen::Index>(model_->p());
+  filter_at(k);
+  const auto g1 = [&](const double* of) { return Entries(of + i * model_->p(), p); };
+  const auto g2 = [&](const double* of) { return Entries(of + entries_ + i * model_->p(), p); };
+  const double *step = filtered_.data(),
+               *signals = drifts(fault_) ? drifting_.data() + (k - s_) * width_ : filtered_.data();
   const double x = way(s_, k), decay = std::exp(-design_.beta * x);
   const SignatureErrors::Row& errors = errors_.row(k, i, x);
-  OnsetRow out{{},
-               signals.g1.row(at),
-               signals.g2.row(at),
-               errors.e1,
-               errors.e2,
-               signals.c[at],
-               errors.ec,
-               {gain_ * decay, design_.order == 2 ? gain_ * decay * x : 0.0,
-                kernel_.apart() > 0.0 ? gain_ * std::exp(-kernel_.gamma() * x) : 0.0}};
+  out.g1 = g1(signals);
+  out.g2 = g2(signals);
+  out.e1 = errors.e1;
+  out.e2 = errors.e2;
+  out.c = signals[2 * entries_ + i];
+  out.ec = errors.ec;
+  out.left = {gain_ * decay, design_.order == 2 ? gain_ * decay * x : 0.0,
+              kernel_.apart() > 0.0 ? gain_ * std::exp(-kernel_.gamma() * x) : 0.0};
   // An effort that reads too much says too little of what the robot may do between samples.
-  out.e0 = Eigen::RowVectorXd::Zero(p);
+  out.e0.setZero(p);
   if (fault_.offset.size() > 0 && motion_->effort_dY.rows() > 0) {
     const auto row = static_cast<Eigen::Index>(k * model_->n() + i);
     out.e1 += fault_.offset.cwiseAbs().maxCoeff() * motion_->effort_dY.row(row);
     out.e0 = motion_->effort_doubt.row(row);
   }
   if (drifts(fault_)) {
-    out.e1 += uncertain_ * step.g1.row(at).cwiseAbs();
-    out.e2 += 2.0 * uncertain_ * step.g2.row(at).cwiseAbs();
-    out.ec += uncertain_ * std::abs(step.c[at]);
+    out.e1 += uncertain_ * g1(step).cwiseAbs();
+    out.e2 += 2.0 * uncertain_ * g2(step).cwiseAbs();
+    out.ec += uncertain_ * std::abs(step[2 * entries_ + i]);
   }
-  return out;
 }
 
 // What is left of δ in the state is γ/(γ − β) (e^{−βx}(δz2 + x δz1) − (e^{−βx} δz1 − e^{−γx} δfast)/(γ − β)).
 std::array<double, 3> OnsetRows::left_bounds(std::size_t i, double kappa, const Eigen::VectorXd& largest) const {
-  const auto at = static_cast<Eigen::Index>(i);
-  const auto size = [&](const FaultSignals& z) {
-    return kTransition * (kappa * (z.g1.row(at).dot(largest) + z.c[at]) + kappa * kappa * z.g2.row(at).dot(largest));
+  using Entries = Eigen::Map<const Eigen::RowVectorXd>;
+  const auto p = static_cast<Eigen::Index>(model_->p());
+  const auto size = [&](Part part) {
+    const double* of = bound_.data() + part * width_;
+    const Entries g1(of + i * model_->p(), p), g2(of + entries_ + i * model_->p(), p);
+    return kTransition * (kappa * (g1.dot(largest) + of[2 * entries_ + i]) + kappa * kappa * g2.dot(largest));
   };
   if (design_.order == 1) {
-    return {size(bound_.z1), 0.0, 0.0};
+    return {size(z1), 0.0, 0.0};
   }
   const double slow = kernel_.slow(), quick = slow * kernel_.apart();
-  const double cut = motion_->cuts.empty() ? 0.0 : size(bound_.soft);  // of a cut behind s_
-  const double z1 = size(bound_.z1) + cut;
-  return {slow * size(bound_.z2) + quick * z1, slow * z1, quick * (size(bound_.fast) + cut)};
+  const double cut = motion_->cuts.empty() ? 0.0 : size(soft);  // of a cut behind s_
+  const double near = size(z1) + cut;
+  return {slow * size(z2) + quick * near, slow * near, quick * (size(fast) + cut)};
 }
 
 std::array<double, 3> OnsetRows::offset_left_bounds(std::size_t i, double size) const {

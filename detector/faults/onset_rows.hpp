@@ -54,8 +54,8 @@ class HypothesisRows {
   virtual void between(std::size_t a, std::size_t b) = 0;
   /// The instant of t_s, b + 1.
   [[nodiscard]] virtual std::size_t start() const = 0;
-  /// Row of output `i` at instant k > start().
-  [[nodiscard]] virtual OnsetRow row(std::size_t k, std::size_t i) = 0;
+  /// Writes to `out`, whatever it held, the row of output `i` at instant k > start().
+  virtual void row(std::size_t k, std::size_t i, OnsetRow& out) = 0;
   /// Whether what was before t_s leaves anything beside what row() says.
   [[nodiscard]] virtual bool leaves() const { return false; }
   /// |A|, |B| and |C| of output `i` are at most this for |θ_j| <= largest_j and |κ| <= `kappa`.
@@ -87,7 +87,7 @@ class OnsetRows final : public HypothesisRows {
 
   void between(std::size_t a, std::size_t b) override;
   [[nodiscard]] std::size_t start() const override { return s_; }
-  [[nodiscard]] OnsetRow row(std::size_t k, std::size_t i) override;
+  void row(std::size_t k, std::size_t i, OnsetRow& out) override;
   [[nodiscard]] bool leaves() const override { return true; }
   [[nodiscard]] std::array<double, 3> left_bounds(std::size_t i, double kappa,
                                                   const Eigen::VectorXd& largest) const override;
@@ -95,14 +95,15 @@ class OnsetRows final : public HypothesisRows {
   [[nodiscard]] bool encoder() const override { return encoder_; }
 
  private:
-  struct State {
-    FaultSignals z1, z2, fast, soft;  // KernelBank, entry by entry
-  };
-  [[nodiscard]] core::RowMatrix jump(std::size_t k) const;
-  [[nodiscard]] State left(std::size_t from, std::size_t at) const;
-  [[nodiscard]] State broken(std::size_t at) const;
-  void pass(State& state, std::size_t from, std::size_t to) const;
-  [[nodiscard]] FaultSignals filtered(std::size_t k) const;
+  // What a KernelBank remembers at one instant: z1, z2, fast and soft, each with the entries of g1, g2 and c.
+  enum Part : std::size_t { z1, z2, fast, soft, parts };
+  [[nodiscard]] const double* jump(std::size_t k) const { return jumps_.data() + (k - first_) * entries_; }
+  [[nodiscard]] const double* state(std::size_t k) const { return states_.data() + (k - first_) * parts * width_; }
+  void find_jumps();
+  void left(std::size_t from, std::size_t at, std::vector<double>& out);
+  void broken(std::size_t at, std::vector<double>& out);
+  void pass(std::vector<double>& state, std::size_t from, std::size_t to) const;
+  void filter_at(std::size_t k);
   [[nodiscard]] double way(std::size_t from, std::size_t to) const { return way_[to - first_] - way_[from - first_]; }
   void take(const FaultType& fault);
 
@@ -114,11 +115,16 @@ class OnsetRows final : public HypothesisRows {
   bool encoder_;
   const ReferenceMotion* motion_;
   std::size_t first_, end_, s_ = 0;
-  double gain_, uncertain_ = 0.0;       // α^order; share of a drift that the onset leaves open
-  std::vector<double> way_;             // s of steps from first_ to each instant, as the filter counts them
-  std::vector<State> state_;            // of an onset at first_, per instant
-  std::vector<FaultSignals> drifting_;  // filtered, of a drift from s_ on
-  State bound_;                         // entry by entry
+  std::size_t entries_, width_;        // n p of g1 alone; 2 n p + n of g1, g2 and c
+  double gain_, uncertain_ = 0.0;      // α^order; share of a drift that the onset leaves open
+  std::vector<double> way_;            // s of steps from first_ to each instant, as the filter counts them
+  std::vector<double> jumps_;          // impulse of a step at each instant, entries_ each
+  std::vector<double> states_;         // of an onset at first_, parts × width_ for each instant
+  std::vector<double> drifting_;       // filtered, of a drift from s_ on, width_ for each instant
+  std::vector<double> bound_;          // parts × width_
+  std::vector<double> left_, before_;  // of one instant: what left() wrote, and its workspace
+  std::vector<double> filtered_;       // of a step that sets in at s_, at instant filtered_at_
+  std::size_t filtered_at_ = 0;        // 0: of none
 };
 
 }  // namespace wheelwright::detector
