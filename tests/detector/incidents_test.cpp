@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Events that one fault explains are one incident, and the faults left are those of all its events.
+#include <cstddef>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -65,6 +67,39 @@ TEST(Incidents, AFaultThatGrowsIsOneIncidentAndSaysSo) {
   EXPECT_TRUE(recorder.open()->candidates[1].changes);
   EXPECT_TRUE(recorder.open()->stays);
   EXPECT_EQ(recorder.open()->candidates[1].finding.magnitude->upper, -0.2);
+}
+
+// An event of an incident's own fault is told by its candidates alone: other faults change nothing then.
+TEST(Incidents, AnEventGoesOnByTheCandidatesAlone) {
+  const Isolation first = of({may_be("left", {0.1, 0.2}, {9.5, 10.0}), may_be("bias", {0.1, 0.2}, {9.5, 10.0})});
+  const FaultFinding same = may_be("left", {0.15, 0.3}, {9.0, 9.8}, true),
+                     other_onset = may_be("left", {0.1, 0.2}, {11.5, 12.0}),
+                     other_size = may_be("left", {0.4, 0.5}, {9.0, 9.8}, true),
+                     foreign = may_be("right", {0.1, 0.2}, {9.5, 12.0});
+  for (const auto& [finding, time, goes_on] :
+       {std::tuple(same, 12.0, true), std::tuple(same, 60.0, true), std::tuple(other_size, 60.0, true),
+        std::tuple(other_onset, 12.0, true), std::tuple(other_onset, 60.0, false), std::tuple(foreign, 12.0, false)}) {
+    IncidentRecorder some, all;
+    EXPECT_FALSE(some.goes_on(event_at(10.0), first)) << "nothing is open";
+    some.add(event_at(10.0), &first);
+    all.add(event_at(10.0), &first);
+    const Isolation asked = of({finding}), everything = of({finding, foreign});
+    EXPECT_EQ(some.goes_on(event_at(time), asked), goes_on) << finding.fault.name << ", " << time;
+    if (!goes_on) {
+      continue;
+    }
+    EXPECT_EQ(some.add(event_at(time), &asked).change, all.add(event_at(time), &everything).change);
+    ASSERT_EQ(some.open()->candidates.size(), all.open()->candidates.size());
+    EXPECT_EQ(some.open()->stays, all.open()->stays);
+    EXPECT_EQ(some.open()->unexplained, all.open()->unexplained);
+    for (std::size_t k = 0; k < some.open()->candidates.size(); ++k) {
+      const IncidentCandidate &a = some.open()->candidates[k], &b = all.open()->candidates[k];
+      EXPECT_EQ(a.finding.fault.name, b.finding.fault.name);
+      EXPECT_EQ(a.finding.magnitude, b.finding.magnitude);
+      EXPECT_EQ(a.finding.onset, b.finding.onset);
+      EXPECT_EQ(a.changes, b.changes);
+    }
+  }
 }
 
 TEST(Incidents, WhatNoFaultOfTheFirstExplainsIsAnother) {

@@ -96,6 +96,30 @@ void holds(const Isolation& isolation, const std::string& fault, double magnitud
       << what << ", at " << onset << ": " << truth.onset.lower << " to " << truth.onset.upper;
 }
 
+// Some faults alone are found to be what they are among all; the others are not examined.
+void is_the_same_of_some(core::LogSource& log, const OnlineModel& model, std::span<const Event> event,
+                         const Isolation& all) {
+  commission::EventIsolationOptions some;
+  for (std::size_t k = 0; k < all.findings.size(); k += 3) {
+    some.only.push_back(all.findings[k].fault.name);
+  }
+  const Isolation found = commission::isolate_events(log, model, event, some).front();
+  ASSERT_EQ(found.findings.size(), all.findings.size());
+  for (std::size_t k = 0; k < all.findings.size(); ++k) {
+    const FaultFinding &a = found.findings[k], &b = all.findings[k];
+    if (k % 3 != 0) {
+      EXPECT_EQ(a.verdict, Verdict::not_examined) << b.fault.name;
+      continue;
+    }
+    ASSERT_EQ(a.verdict, b.verdict) << b.fault.name;
+    if (a.verdict == Verdict::consistent) {
+      EXPECT_EQ(a.magnitude, b.magnitude) << b.fault.name;
+      EXPECT_EQ(a.onset, b.onset) << b.fault.name;
+      EXPECT_EQ(a.earlier, b.earlier) << b.fault.name;
+    }
+  }
+}
+
 void try_runs(std::uint64_t robot_seed, bool position, Tally& tally) {
   const Posed robot = posed_robot(robot_seed, position);
   OnlineModel blind = robot.model;
@@ -121,6 +145,7 @@ void try_runs(std::uint64_t robot_seed, bool position, Tally& tally) {
     if (!torque.empty()) {
       ++tally.torque;
       holds(torque.front(), breakage.fault, magnitude, run.onset, what + "alarm of the torque residual");
+      is_the_same_of_some(log, robot.model, first(detection), torque.front());
       const auto alone = commission::isolate_events(log, blind, first(detection));
       tally.by_torque += alone.front().count(Verdict::consistent);
       tally.by_both += torque.front().count(Verdict::consistent);
@@ -130,6 +155,7 @@ void try_runs(std::uint64_t robot_seed, bool position, Tally& tally) {
       ++tally.kinematic;
       holds(motion.front(), breakage.fault, magnitude, run.onset, what + "alarm of the kinematic residual");
       tally.left += motion.front().count(Verdict::consistent);
+      is_the_same_of_some(log, robot.model, first(*kinematic.detection), motion.front());
       for (const FaultFinding& f : motion.front().findings) {
         EXPECT_FALSE(f.verdict == Verdict::consistent && f.fault.name.starts_with("effort_"))
             << what << f.fault.name << " does not move a robot beside its wheels";
