@@ -32,7 +32,7 @@ struct EventIsolationOptions {
 /// by both residuals where the log has the columns of both: a fault must explain what each shows about the alarm, and
 /// what each does not show (odometry_isolation.hpp). Walks the log once and holds the rows around these events. One
 /// result for each of them. Where the model says something at a stated risk, sums over all scales are asked, too
-/// (narrow_by_sums()): the log is walked once more for each event.
+/// (narrow_by_sums()): the log is walked once more for each event of which a fault that is left has an onset.
 [[nodiscard]] std::vector<detector::Isolation> isolate_events(LogSource& log, const OnlineModel& model,
                                                               std::span<const detector::Event> events,
                                                               const EventIsolationOptions& options = {});
