@@ -181,7 +181,14 @@ Case draw_case(const Request& request, std::uint64_t item, const Subject* fixed)
   const auto stream = [&](std::uint64_t number) { return Random(request.seed, item, number); };
   Case result;
   Random robot_draws = stream(of_robot);
-  result.robot = draw_robot(robot_draws, request.hard);
+  Lot lot;
+  lot.noise = request.hard ? 3.0 : 1.0;
+  lot.imperfect = request.hard || request.wide;
+  if (request.wide) {
+    lot.least = 0.5;
+    lot.most = 500.0;
+  }
+  result.robot = draw_robot(robot_draws, lot);
   RobotDesign& robot = result.robot;
   const auto drive_of = [&](std::uint64_t number) {
     Random draws = stream(number);

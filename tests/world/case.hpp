@@ -27,6 +27,7 @@ struct Request {
   double duration = 120.0;  ///< s
   std::string effect;       ///< this effect alone, where it is given
   LawChoice laws;           ///< what effects follow; it changes no other draw
+  bool wide = false;        ///< robots of 0.5 to 500 kg, none of which is quite what its file says
   bool each = false;        ///< every effect and law in turn, one to a case
 };
 

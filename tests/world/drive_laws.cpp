@@ -349,38 +349,7 @@ Effect hunt_crossley(const RobotDesign& robot, Random random, double severity) {
   return effect;
 }
 
-// Tyres: the rotor and the rim turn at their own speed, and the ground's torque by the slip drives the rolling wheel.
-
-/// `grip(slip)` is the ground's torque on the wheel, N m.
-Effect tyre(const RobotDesign& robot, Parameters parameters, const Curve& grip) {
-  const double inertia = robot.body.armature[right] + 0.5 * wheel_spin(robot.body);
-  const double least = 0.05 * robot.wheel_speed;  // rad/s: below it the slip is a speed over this
-  const auto rim = std::make_shared<Pair>();
-  Effect effect;
-  effect.parameters = std::move(parameters);
-  effect.build = take_rotor;
-  effect.actuate = [=](const State& state, Pair& torque) {
-    constexpr int substeps = 20;
-    const double h = state.step / substeps;
-    for (std::size_t i = 0; i < 2; ++i) {
-      double& speed = (*rim)[i];
-      double sum = 0.0;
-      for (int k = 0; k < substeps; ++k) {
-        const auto ground = [&](double w) {
-          return grip((w - state.speed[i]) / std::max({std::abs(w), std::abs(state.speed[i]), least}));
-        };
-        const double now = ground(speed);
-        const double slope = std::max((ground(speed + 1e-4) - now) / 1e-4, 0.0);
-        const double change = h * (torque[i] - now) / (inertia + h * slope);
-        sum += now + slope * change;
-        speed += change;
-      }
-      torque[i] = sum / substeps;
-    }
-  };
-  effect.measure = [rim](const State&, Pair& speed) { speed = *rim; };
-  return effect;
-}
+// Tyres.
 
 /// Stiffness (torque at slip 1 of the straight line) and the largest torque of a tyre.
 std::pair<double, double> draw_tyre(const RobotDesign& robot, Random& random, double severity) {
@@ -487,6 +456,36 @@ Effect oval(const RobotDesign& robot, Random random, double severity) {
 }
 
 }  // namespace
+
+Effect tyre(const RobotDesign& robot, Parameters parameters, const Curve& grip) {
+  const double inertia = robot.body.armature[right] + 0.5 * wheel_spin(robot.body);
+  const double least = 0.05 * robot.wheel_speed;  // rad/s: below it the slip is a speed over this
+  const auto rim = std::make_shared<Pair>();
+  Effect effect;
+  effect.parameters = std::move(parameters);
+  effect.build = take_rotor;
+  effect.actuate = [=](const State& state, Pair& torque) {
+    constexpr int substeps = 20;
+    const double h = state.step / substeps;
+    for (std::size_t i = 0; i < 2; ++i) {
+      double& speed = (*rim)[i];
+      double sum = 0.0;
+      for (int k = 0; k < substeps; ++k) {
+        const auto ground = [&](double w) {
+          return grip((w - state.speed[i]) / std::max({std::abs(w), std::abs(state.speed[i]), least}));
+        };
+        const double now = ground(speed);
+        const double slope = std::max((ground(speed + 1e-4) - now) / 1e-4, 0.0);
+        const double change = h * (torque[i] - now) / (inertia + h * slope);
+        sum += now + slope * change;
+        speed += change;
+      }
+      torque[i] = sum / substeps;
+    }
+  };
+  effect.measure = [rim](const State&, Pair& speed) { speed = *rim; };
+  return effect;
+}
 
 std::vector<Law> drive_laws() {
   using enum Origin;

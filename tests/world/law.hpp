@@ -37,11 +37,15 @@ struct Law {
 [[nodiscard]] std::vector<Law> drive_laws();
 /// @}
 
+/// A law for each effect of which several laws are known, whose functions are drawn with the effect: Increasing of speed,
+/// load, depth, slip or time, and filters of random times. They are not in laws(), so that sets of those stay as they are.
+[[nodiscard]] const std::vector<Law>& drawn_laws();
+
 /// Which laws a set of cases is drawn from.
 class LawChoice {
  public:
   /// `given`: the law of each Entry, and no draw. `all`: the table's. `other`: the table's without the common formulas.
-  /// Else laws by comma, each `law` or `effect/law`; an effect of which none is named keeps that of its Entry. Throws
+  /// `drawn`: drawn_laws(). Else laws by comma, each `law` or `effect/law`; an effect of which none is named keeps that of its Entry. Throws
   /// InvalidArgument for a law that nobody knows.
   explicit LawChoice(std::string_view text = "given");
 
@@ -67,6 +71,20 @@ using Curve = std::function<double(double)>;
 struct Table {
   std::vector<double> at, value;
   [[nodiscard]] double operator()(double x) const;
+};
+
+/// An increasing function from (0, 0) to (1, 1) between three to seven knots that are drawn: straight lines, or of any
+/// bend also cubics (Fritsch and Butland 1984). Goes straight on beyond 1. No line is steeper than four times the mean.
+class Increasing {
+ public:
+  enum class Bend { any, convex, concave };
+  explicit Increasing(Random& random, Bend bend = Bend::any);
+  /// At x >= 0.
+  [[nodiscard]] double operator()(double x) const;
+
+ private:
+  std::vector<double> x_{0.0}, y_{0.0}, slope_;
+  bool smooth_ = false;
 };
 
 /// level(|ω|) sgn ω, smooth within 0.02.
@@ -97,6 +115,10 @@ struct BrushTyre {
   double stiffness = 1.0, limit = 1.0;
   [[nodiscard]] double operator()(double slip) const;
 };
+
+/// A tyre at each wheel: rotor and rim turn at their own speed, which is what the encoder shows, and the ground's torque
+/// grip(slip), N m, drives the rolling wheel.
+[[nodiscard]] Effect tyre(const RobotDesign& robot, Parameters parameters, const Curve& grip);
 
 /// A rotor with a gap before the wheel and rigid contacts: impacts with restitution, and no bounce below `slow` rad/s.
 struct Gear {

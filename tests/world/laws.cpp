@@ -33,6 +33,11 @@ LawChoice::LawChoice(std::string_view text) {
     const std::string_view word = rest.substr(0, rest.find(','));
     rest.remove_prefix(std::min(word.size() + 1, rest.size()));
     const std::size_t before = able_.size();
+    for (const Law& law : drawn_laws()) {
+      if (word == "drawn") {
+        able_.push_back(&law);
+      }
+    }
     for (const Law& law : laws()) {
       const bool named = word == "all" || (word == "other" && !law.formula) || word == law.name ||
                          (word.size() == law.effect.size() + law.name.size() + 1 && word.starts_with(law.effect) &&
@@ -43,7 +48,7 @@ LawChoice::LawChoice(std::string_view text) {
     }
     if (able_.size() == before) {
       throw InvalidArgument(fmt::format(
-          "--laws: no law '{}'; given, all, other, a law or effect/law of `wheelwright-reality laws`", word));
+          "--laws: no law '{}'; given, all, other, drawn, a law or effect/law of `wheelwright-reality laws`", word));
     }
   }
 }

@@ -2,6 +2,8 @@
 // Each law against its closed form, and every effect under every law in the world.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -188,10 +190,57 @@ TEST(Laws, AreDrawnEvenly) {
   }
 }
 
+// By the properties that the families promise, of many draws, and by the bend of chords.
+TEST(Increasing, RisesFromNothingToOneWithItsBendAndNoSteeperThanFour) {
+  using Bend = Increasing::Bend;
+  double least = 1.0;
+  double most = 0.0;
+  for (std::uint64_t k = 0; k < 300; ++k) {
+    const Bend bend = std::array{Bend::any, Bend::convex, Bend::concave}[k % 3];
+    Random random(11, k, 0);
+    const Increasing curve(random, bend);
+    EXPECT_DOUBLE_EQ(curve(0.0), 0.0);
+    EXPECT_NEAR(curve(1.0), 1.0, 1e-12);
+    EXPECT_GT(curve(1.5), curve(1.0));
+    constexpr int pieces = 500;
+    double before = 0.0;
+    double rise_before = 0.0;
+    for (int n = 1; n <= pieces; ++n) {
+      const double value = curve(static_cast<double>(n) / pieces);
+      const double rise = value - before;
+      EXPECT_GT(rise, 0.0) << k << " at " << n;
+      // A cubic between two lines is at most one and a half times as steep as they are.
+      EXPECT_LE(rise * pieces, (bend == Bend::any ? 6.0 : 4.0) + 1e-9) << k << " at " << n;
+      if (n > 1 && bend != Bend::any) {
+        EXPECT_GE(bend == Bend::convex ? rise - rise_before : rise_before - rise, -1e-12) << k << " at " << n;
+      }
+      before = value;
+      rise_before = rise;
+    }
+    least = std::min(least, curve(0.5));
+    most = std::max(most, curve(0.5));
+  }
+  EXPECT_LT(least, 0.25) << "the family is wide";
+  EXPECT_GT(most, 0.75);
+}
+
+TEST(DrawnLaws, OneForEveryEffectThatHasSeveralAndNoneElse) {
+  std::set<std::string_view> several, drawn;
+  for (const Law& law : laws()) {
+    several.insert(law.effect);
+  }
+  for (const Law& law : drawn_laws()) {
+    EXPECT_TRUE(drawn.insert(law.effect).second) << law.effect;
+    EXPECT_EQ(std::count_if(laws().begin(), laws().end(), [&](const Law& other) { return &other == &law; }), 0);
+  }
+  EXPECT_EQ(drawn, several);
+  EXPECT_EQ(LawChoice("drawn").able().size(), drawn.size());
+}
+
 struct World {
   World() {
     Random draws(3, 0, 1);
-    robot = draw_robot(draws, false);
+    robot = draw_robot(draws, Lot());
     // A whole drive has every manoeuvre; its first seconds are enough to see that a law acts.
     drive = draw_drive(robot, draws, 20.0);
   }
@@ -217,6 +266,25 @@ TEST(Subjects, EveryLawActsOnTheRobot) {
   }
 }
 
+TEST(DrawnLaws, EachActsAndNoTwoDrawsAreAlike) {
+  const World world;
+  for (const Law& law : drawn_laws()) {
+    const Subject subject{&find_entry(law.effect), &law};
+    const double severity = std::min(1.0, subject.entry->largest);
+    std::vector<double> gaps;
+    for (std::uint64_t draw = 0; draw < 2; ++draw) {
+      std::vector<Effect> effects;
+      effects.push_back(subject.make(world.robot, Random(5, draw, 9), severity));
+      const Record record = run_world(world.robot, effects, world.drive, step);
+      const Gap gap = measure_gap(world.robot, signals_of(world.robot, record), 20.0);
+      EXPECT_GT(gap.before, 0.5) << law.effect << ": the healthy robot has 0.06";
+      EXPECT_LT(gap.after, 100.0) << law.effect << ": it would be no such robot";
+      gaps.push_back(gap.before);
+    }
+    EXPECT_GT(std::abs(gaps[1] / gaps[0] - 1.0), 1e-3) << law.effect;
+  }
+}
+
 // Bristles, teeth and tyres have states of their own that are faster than the world's step. The engine's sliding
 // contacts do not converge so (16 and 11 per cent on this robot): their stiffness goes with the step.
 TEST(Subjects, FastLawsConvergeWithTheStep) {
@@ -229,6 +297,41 @@ TEST(Subjects, FastLawsConvergeWithTheStep) {
     const double coarse = world.gap(subject, 1.0).before;
     const double fine = world.gap(subject, 1.0, 0.5 * step).before;
     EXPECT_NEAR(coarse / fine, 1.0, 0.03) << law->effect << " " << law->name;
+  }
+}
+
+// The teeth and the tyre of drawn laws have fast states of their own, too.
+TEST(DrawnLaws, ConvergeWithTheStep) {
+  const World world;
+  for (const Law& law : drawn_laws()) {
+    const Subject subject{&find_entry(law.effect), &law};
+    const double severity = std::min(1.0, subject.entry->largest);
+    EXPECT_NEAR(world.gap(subject, severity).before / world.gap(subject, severity, 0.5 * step).before, 1.0, 0.05)
+        << law.effect;
+  }
+}
+
+TEST(Robot, TheWideLotHasSmallAndLargeOnesThatDrive) {
+  double least = 1e9;
+  double most = 0.0;
+  for (std::uint64_t k = 0; k < 60; ++k) {
+    Random random(3, k, 1);
+    const RobotDesign robot = draw_robot(random, {0.5, 500.0, 1.0, true});
+    const double total = robot.body.chassis_mass + 2.0 * robot.body.wheel_mass;
+    least = std::min(least, total);
+    most = std::max(most, total);
+    EXPECT_NE(robot.body.radius[right], robot.radius);
+  }
+  EXPECT_GT(least, 0.5);
+  EXPECT_LT(least, 2.0);
+  EXPECT_GT(most, 150.0);
+  EXPECT_LT(most, 500.0);
+  for (const double total : {0.55, 450.0}) {
+    Random random(3, 0, 1);
+    const RobotDesign robot = draw_robot(random, {total, 1.001 * total, 1.0, false});
+    std::vector<Effect> nothing;
+    const Record record = run_world(robot, nothing, draw_drive(robot, random, 20.0), step);
+    EXPECT_LT(measure_gap(robot, signals_of(robot, record), 20.0).after, 1.0) << total << " kg, healthy";
   }
 }
 

@@ -262,9 +262,11 @@ int main(int count, char** arguments) try {
   make.add_option("--effect", request.effect, "this effect in every case");
   make.add_option(
           "--laws", chosen,
-          "what effects follow: all laws that `laws` lists, other (without the common formulas), given (the law "
-          "of each effect before there were several), laws by comma, or each: every law in turn")
+          "what effects follow: all laws that `laws` lists, other (without the common formulas), drawn (functions and "
+          "filters drawn anew for each case), given (the law of each effect before there were several), laws by "
+          "comma, or each: every law in turn")
       ->capture_default_str();
+  make.add_flag("--wide", request.wide, "robots of 0.5 to 500 kg (otherwise 5 to 150), none quite what its file says");
   make.add_option("--duration", request.duration, "of each drive, s")
       ->check(CLI::Range(50.0, 3600.0))
       ->capture_default_str();

@@ -39,10 +39,10 @@ double wheel_spin(const Body& body) {
   return 0.5 * body.wheel_mass * r * r;
 }
 
-RobotDesign draw_robot(Random& random, bool hard) {
+RobotDesign draw_robot(Random& random, const Lot& lot) {
   RobotDesign robot;
   Body& b = robot.body;
-  const double total = random.log_uniform(5.0, 150.0);
+  const double total = random.log_uniform(lot.least, lot.most);
   const double size = std::cbrt(total / 40.0);
   robot.radius = size * random.uniform(0.08, 0.13);
   robot.half_track = size * random.uniform(0.20, 0.30);
@@ -69,11 +69,10 @@ RobotDesign draw_robot(Random& random, bool hard) {
   const std::array<double, 3> rates{100.0, 125.0, 200.0};
   robot.rate = rates[random.below(rates.size())];
   robot.counts = std::exp2(10.0 + static_cast<double>(random.below(7)));
-  const double noisy = hard ? 3.0 : 1.0;
-  robot.torque_noise = noisy * robot.typical_torque() * random.log_uniform(0.005, 0.06);
-  robot.position_noise = noisy * random.log_uniform(0.0003, 0.002);
-  robot.heading_noise = noisy * random.log_uniform(0.0003, 0.002);
-  if (hard) {
+  robot.torque_noise = lot.noise * robot.typical_torque() * random.log_uniform(0.005, 0.06);
+  robot.position_noise = lot.noise * random.log_uniform(0.0003, 0.002);
+  robot.heading_noise = lot.noise * random.log_uniform(0.0003, 0.002);
+  if (lot.imperfect) {
     make_imperfect(robot, random);
   }
   return robot;

@@ -105,9 +105,16 @@ struct RobotDesign {
   [[nodiscard]] double typical_torque() const { return 0.5 * radius * mass * 0.5 * acceleration; }
 };
 
-/// A healthy robot of 5 to 150 kg. `hard` has three times the noise and small imperfections: radii, track, gains,
-/// a bias and dry friction, of a per cent or less.
-[[nodiscard]] RobotDesign draw_robot(Random& random, bool hard);
+/// What robots are drawn from.
+struct Lot {
+  double least = 5.0;      ///< kg
+  double most = 150.0;     ///< kg
+  double noise = 1.0;      ///< of the sensors, as a factor
+  bool imperfect = false;  ///< radii, track, gains, a bias and dry friction are off by a per cent or less
+};
+
+/// A healthy robot of `lot`.
+[[nodiscard]] RobotDesign draw_robot(Random& random, const Lot& lot);
 
 /// Moment of inertia of a wheel about its axle, kg m².
 [[nodiscard]] double wheel_spin(const Body& body);

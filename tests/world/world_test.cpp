@@ -17,7 +17,7 @@ constexpr double beta = 20.0;
 struct World {
   explicit World(std::uint64_t seed) {
     Random draws(seed, 0, 1);
-    robot = draw_robot(draws, false);
+    robot = draw_robot(draws, Lot());
     drive = draw_drive(robot, draws, 40.0);
   }
 
