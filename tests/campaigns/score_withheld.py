@@ -95,7 +95,7 @@ def class_of(answer):
     if not answer.get("in_catalogue", True):
         return "outside"
     if len(names) > 1:
-        return "pair"
+        return "pair" if len(names) == 2 else "triple"
     return "parametric" if names[0] in PARAMETRIC else "single"
 
 
@@ -223,7 +223,7 @@ def score(answers, results, naive=False):
         rows["results that are there"].add(gap is not None)
         if gap is None:
             missed.append(f"{case}: {label}: no result")
-            confusion["two effects" if kind == "pair" else label]["no result"] += 1
+            confusion[f"{len(truth)} effects" if kind in ("pair", "triple") else label]["no result"] += 1
             continue
         gap = naive_answer(gap) if naive else gap
         verdict = gap.get("verdict", "")
@@ -238,7 +238,7 @@ def score(answers, results, naive=False):
             answered = " + ".join(sorted(causes)) or verdict
             if verdict == "ambiguous":
                 answered += " (ambiguous)"
-        confusion["two effects" if kind == "pair" else label][answered] += 1
+        confusion[f"{len(truth)} effects" if kind in ("pair", "triple") else label][answered] += 1
 
         good = True
         if kind in ("single", "parametric"):
@@ -255,13 +255,14 @@ def score(answers, results, naive=False):
             good = right or inside
             if kind == "single":
                 sizes.append(len(kept))
-        elif kind == "pair":
+        elif kind in ("pair", "triple"):
+            several = "two" if kind == "pair" else "three"
             all_kept = [families(member) for member in kept] + [families(causes)]
             both = any(families(truth) <= member for member in all_kept)
             one = any(families(truth) & member for member in all_kept)
-            rows["two effects: both found"].add(both)
-            rows["two effects: at least one found"].add(one)
-            rows["two effects: exactly these as the verdict"].add(right)
+            rows[f"{several} effects: {'both' if kind == 'pair' else 'all'} found"].add(both)
+            rows[f"{several} effects: at least one found"].add(one)
+            rows[f"{several} effects: exactly these as the verdict"].add(right)
             good = both
         elif kind == "none":
             rows["no effect: no_gap"].add(verdict == "no_gap")
@@ -311,9 +312,10 @@ def report_profiles(answers, results, rest=None, out=sys.stdout):
             add("one effect: in the answer, alone or beside others", any(truth <= member for member in kept))
             add("one effect: in the answer, alone", any(truth == member for member in kept))
             add("one effect: alone, and explained", explained and causes == truth)
-        elif kind == "pair":
-            add("two effects: exactly these", causes == truth)
-            add("two effects: among those said", any(truth <= member for member in kept))
+        elif kind in ("pair", "triple"):
+            several = "two" if kind == "pair" else "three"
+            add(f"{several} effects: exactly these", causes == truth)
+            add(f"{several} effects: among those said", any(truth <= member for member in kept))
         elif kind == "none":
             add("no effect: no_gap", verdict == "no_gap")
         else:
@@ -325,12 +327,15 @@ def report_profiles(answers, results, rest=None, out=sys.stdout):
     print(f"| measure | {' | '.join(profiles)} |\n|---|{'---|' * len(profiles)}", file=out)
     for row in ("one effect: in the answer, alone or beside others", "one effect: in the answer, alone",
                 "one effect: alone, and explained", "two effects: exactly these", "two effects: among those said",
+                "three effects: exactly these", "three effects: among those said",
                 "no effect: no_gap", "outside the catalogue: unexplained", "blamed on one wrong cause",
                 "a gap called no_gap"):
+        if row.startswith("three") and row not in rows:
+            continue
         print(f"| {row} | {' | '.join(str(rows[row][p]) for p in profiles)} |", file=out)
 
 
-ORDER = ["results", "single", "parametric", "two", "no effect", "outside"]
+ORDER = ["results", "single", "parametric", "two", "three", "no effect", "outside"]
 
 
 def report(answers, results, naive=False, out=sys.stdout):

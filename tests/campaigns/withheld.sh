@@ -4,13 +4,14 @@
 # Withheld effects: has `wheelwright gap` name what another physics engine hid in logs, and scores the answers.
 #
 #   tests/campaigns/withheld.sh [--seed S] [--cases N] [--profile standard|plain|hard] [--kind KIND] [--laws LAWS]
-#                     [--wide] [--duration S] [--out DIR] [--only naive|removed] [SET]
+#                     [--wide] [--ordinary] [--duration S] [--out DIR] [--only naive|removed] [SET]
 #
 # SET is a directory of cases that is there already: case_*/ (or logs/case_*/) beside answers.json. Without it a set is
 # made in DIR/set. The tool sees logs and robot file of a case and nothing else; its results are in DIR/results, without
 # the drive that would split ambiguous causes, which takes longer than all the rest.
 #   --laws LAWS     what effects follow (`wheelwright-reality generate --help`); each: a case for every effect and law
 #   --wide          robots of 0.5 to 500 kg, none quite what its file says
+#   --ordinary      logs with jitter, lost rows and, one in four, smoothed speeds
 #   --only naive    scores what the naive rule said; results in DIR/results-naive
 #   --only removed  takes the hidden effect (and those that contain it) out of the tool's catalogue, for cases of one
 #                   effect
@@ -21,7 +22,7 @@ set -eu
 root=$(cd "$(dirname "$0")/../.." && pwd)
 bin=${BUILD:-$root/build}/bin
 jobs=${JOBS:-2}
-seed=1 cases='' profile=standard kind=mixed laws=all duration=120 wide='' out=out/withheld only='' set=''
+seed=1 cases='' profile=standard kind=mixed laws=all duration=120 wide='' ordinary='' out=out/withheld only='' set=''
 while [ $# -gt 0 ]; do
   case $1 in
     --seed | --cases | --profile | --kind | --laws | --duration | --out | --only)
@@ -38,6 +39,7 @@ while [ $# -gt 0 ]; do
       esac
       shift 2 ;;
     --wide) wide=--wide; shift ;;
+    --ordinary) ordinary=--ordinary; shift ;;
     -*) echo "withheld: unknown option $1" >&2; exit 2 ;;
     *) set=$1; shift ;;
   esac
@@ -48,7 +50,7 @@ if [ -z "$set" ]; then
   set=$out/set
   [ -n "$cases" ] || [ "$laws" = each ] || cases=60
   "$bin/wheelwright-reality" generate --seed "$seed" ${cases:+--cases "$cases"} --profile "$profile" --kind "$kind" \
-    --laws "$laws" $wide --duration "$duration" --out "$set" --threads "$jobs"
+    --laws "$laws" $wide $ordinary --duration "$duration" --out "$set" --threads "$jobs"
 fi
 logs=$set
 [ ! -d "$set/logs" ] || logs=$set/logs

@@ -20,6 +20,7 @@ enum Stream : std::uint64_t {
   of_fresh,
   of_kind,
   of_noise = 10,
+  of_logger = 20,
   of_effect = 100,
   of_law = 1000
 };
@@ -41,9 +42,10 @@ Kind draw_kind(Random& random) {
 
 const Entry& draw_entry(Random& random, Kind kind) {
   std::vector<const Entry*> able;
+  const bool several = kind == Kind::pair || kind == Kind::triple;
   for (const Entry& entry : catalogue()) {
     const bool wanted = kind == Kind::outside ? entry.kind == Class::outside
-                        : kind == Kind::pair  ? entry.kind == Class::structural
+                        : several             ? entry.kind == Class::structural
                                               : entry.kind != Class::outside;
     if (wanted) {
       able.push_back(&entry);
@@ -208,7 +210,7 @@ Case draw_case(const Request& request, std::uint64_t item, const Subject* fixed)
   if (!request.effect.empty() || fixed != nullptr) {
     kind = Kind::single;
   }
-  const std::size_t wanted = kind == Kind::none ? 0 : kind == Kind::pair ? 2 : 1;
+  const std::size_t wanted = kind == Kind::none ? 0 : kind == Kind::pair ? 2 : kind == Kind::triple ? 3 : 1;
   const Source source{request, item, robot};
   std::vector<std::uint64_t> streams;
   for (std::uint64_t attempt = 0; result.causes.size() < wanted; ++attempt) {
@@ -227,7 +229,8 @@ Case draw_case(const Request& request, std::uint64_t item, const Subject* fixed)
     const double least = std::max(3.0 * floor, request.low * share);
     const double target = draws.log_uniform(least, std::max(request.high * share, 1.2 * least));
     const double free = draws.log_uniform(0.4, 1.6) * share;
-    if (!result.causes.empty() && alike(result.causes[0].of, subject)) {
+    if (std::any_of(result.causes.begin(), result.causes.end(),
+                    [&](const Cause& cause) { return alike(cause.of, subject); })) {
       continue;
     }
     const std::uint64_t draw = of_effect + attempt;
@@ -272,6 +275,14 @@ Case draw_case(const Request& request, std::uint64_t item, const Subject* fixed)
   }
   const double real_floor = noise_floor(robot, clean, signals_of(robot, result.real), beta);
   result.oracle = ask_oracle(robot, clean, truth, parametric, std::max(real_floor, 0.05), beta);
+  if (request.ordinary) {
+    Random logger_draws = stream(of_logger);
+    const Logger logger = draw_logger(logger_draws);
+    std::uint64_t number = of_logger;
+    for (LogTable* log : {&result.baseline, &result.real, &result.fresh}) {
+      *log = write_down(logger, *log, 1.0 / robot.rate, stream(++number));
+    }
+  }
   return result;
 }
 

@@ -15,7 +15,7 @@
 namespace wheelwright::reality {
 
 /// Composition of a set.
-enum class Kind { mixed, single, pair, none, outside };
+enum class Kind { mixed, single, pair, triple, none, outside };
 
 /// Request for random cases. Equal requests give equal cases.
 struct Request {
@@ -28,6 +28,7 @@ struct Request {
   std::string effect;       ///< this effect alone, where it is given
   LawChoice laws;           ///< what effects follow; it changes no other draw
   bool wide = false;        ///< robots of 0.5 to 500 kg, none of which is quite what its file says
+  bool ordinary = false;    ///< logs with jitter, lost rows and smoothed speeds (Logger)
   bool each = false;        ///< every effect and law in turn, one to a case
 };
 

@@ -37,16 +37,17 @@ struct Law {
 [[nodiscard]] std::vector<Law> drive_laws();
 /// @}
 
-/// A law for each effect of which several laws are known, whose functions are drawn with the effect: Increasing of speed,
-/// load, depth, slip or time, and filters of random times. They are not in laws(), so that sets of those stay as they are.
+/// A law for each effect of which several laws are known, whose functions are drawn with the effect: Increasing of
+/// speed, load, depth, slip or time, and filters of random times. They are not in laws(), so that sets of those stay as
+/// they are.
 [[nodiscard]] const std::vector<Law>& drawn_laws();
 
 /// Which laws a set of cases is drawn from.
 class LawChoice {
  public:
   /// `given`: the law of each Entry, and no draw. `all`: the table's. `other`: the table's without the common formulas.
-  /// `drawn`: drawn_laws(). Else laws by comma, each `law` or `effect/law`; an effect of which none is named keeps that of its Entry. Throws
-  /// InvalidArgument for a law that nobody knows.
+  /// `drawn`: drawn_laws(). Else laws by comma, each `law` or `effect/law`; an effect of which none is named keeps that
+  /// of its Entry. Throws InvalidArgument for a law that nobody knows.
   explicit LawChoice(std::string_view text = "given");
 
   /// A law of `effect` drawn from `random`; null: the Entry's.
@@ -116,8 +117,8 @@ struct BrushTyre {
   [[nodiscard]] double operator()(double slip) const;
 };
 
-/// A tyre at each wheel: rotor and rim turn at their own speed, which is what the encoder shows, and the ground's torque
-/// grip(slip), N m, drives the rolling wheel.
+/// A tyre at each wheel: rotor and rim turn at their own speed, which is what the encoder shows, and the ground's
+/// torque grip(slip), N m, drives the rolling wheel.
 [[nodiscard]] Effect tyre(const RobotDesign& robot, Parameters parameters, const Curve& grip);
 
 /// A rotor with a gap before the wheel and rigid contacts: impacts with restitution, and no bounce below `slow` rad/s.

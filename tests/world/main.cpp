@@ -245,11 +245,9 @@ int main(int count, char** arguments) try {
   std::string profile = "standard";
   std::string chosen = "all";
   std::string out;
-  const std::map<std::string, Kind> kinds{{"mixed", Kind::mixed},
-                                          {"single", Kind::single},
-                                          {"pair", Kind::pair},
-                                          {"none", Kind::none},
-                                          {"outside", Kind::outside}};
+  const std::map<std::string, Kind> kinds{{"mixed", Kind::mixed}, {"single", Kind::single},
+                                          {"pair", Kind::pair},   {"triple", Kind::triple},
+                                          {"none", Kind::none},   {"outside", Kind::outside}};
   make.add_option("--seed", request.seed, "of all draws")->capture_default_str();
   make.add_option("--cases", cases, "how many; 10 where nothing is said, with --laws each one of each");
   make.add_option("--first", first, "number of the first")->capture_default_str();
@@ -267,6 +265,9 @@ int main(int count, char** arguments) try {
           "comma, or each: every law in turn")
       ->capture_default_str();
   make.add_flag("--wide", request.wide, "robots of 0.5 to 500 kg (otherwise 5 to 150), none quite what its file says");
+  make.add_flag("--ordinary", request.ordinary,
+                "logs with jitter of the time stamps (to 20 % of the period), lost rows (0.05 to 2 %, in bursts) and, "
+                "one in four, smoothed speeds");
   make.add_option("--duration", request.duration, "of each drive, s")
       ->check(CLI::Range(50.0, 3600.0))
       ->capture_default_str();

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -53,6 +54,42 @@ LogTable sense(const RobotDesign& robot, const Record& record, Random random) {
     log.columns[6].push_back(rounded(std::remainder(heading, 2.0 * std::numbers::pi), 1e-5));
   }
   return log;
+}
+
+Logger draw_logger(Random& random) {
+  Logger logger;
+  logger.jitter = random.uniform(0.0, 0.2);
+  logger.lost = random.log_uniform(0.0005, 0.02);
+  logger.burst = random.log_uniform(1.0, 8.0);
+  const std::size_t rows = 2 + random.below(3);
+  logger.smoothing = random.below(4) == 0 ? rows : 1;
+  return logger;
+}
+
+LogTable write_down(const Logger& logger, const LogTable& log, double period, Random random) {
+  LogTable written;
+  written.names = log.names;
+  written.columns.assign(log.columns.size(), {});
+  // Two states (Gilbert 1960): rows are written, or lost until the burst ends.
+  const double begins = logger.lost / (logger.burst * (1.0 - logger.lost));
+  bool losing = false;
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    losing = random.uniform(0.0, 1.0) < (losing ? 1.0 - 1.0 / logger.burst : begins);
+    const double late = logger.jitter * period * random.uniform(-1.0, 1.0);
+    if (losing && k > 0 && k + 1 < log.rows()) {
+      continue;
+    }
+    written.t.push_back(rounded(log.t[k] + late, 1e-6));
+    for (std::size_t c = 0; c < log.columns.size(); ++c) {
+      const std::size_t rows = c < 2 ? std::min(logger.smoothing, k + 1) : 1;
+      double sum = 0.0;
+      for (std::size_t n = 0; n < rows; ++n) {
+        sum += log.columns[c][k - n];
+      }
+      written.columns[c].push_back(rows > 1 ? rounded(sum / static_cast<double>(rows), 1e-6) : sum);
+    }
+  }
+  return written;
 }
 
 Signals signals_of(const RobotDesign& robot, const Record& record) {

@@ -14,6 +14,20 @@ namespace wheelwright::reality {
 /// torque and pose, the heading wrapped, values rounded to what the sensors resolve.
 [[nodiscard]] LogTable sense(const RobotDesign& robot, const Record& record, Random random);
 
+/// How a robot's computer writes its log: what ordinary ones have beside noise.
+struct Logger {
+  double jitter = 0.0;        ///< of time stamps, largest, as a share of the period (< 0.5)
+  double lost = 0.0;          ///< share of the rows that are missing
+  double burst = 1.0;         ///< mean number of rows lost at once
+  std::size_t smoothing = 1;  ///< speeds are means over so many rows up to this one
+};
+
+/// One in four smooths its speeds over two to four rows; the others do not.
+[[nodiscard]] Logger draw_logger(Random& random);
+
+/// `log`, whose rows are `period` (s) apart, as `logger` writes it. The first and the last row stay.
+[[nodiscard]] LogTable write_down(const Logger& logger, const LogTable& log, double period, Random random);
+
 /// One additional torque and one additional speed: s and d = τ_R − τ_L in N m, m/s, rad/s, an entry per row.
 struct Column {
   Eigen::VectorXd s, d, v1, v2;

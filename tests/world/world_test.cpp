@@ -2,6 +2,7 @@
 // The other world against closed forms: what it drives is the nominal model, and each effect adds what it should.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.hpp"
@@ -110,6 +111,59 @@ TEST(World, EveryEffectHasANameOfItsOwn) {
     EXPECT_EQ(&find_entry(entry.name), &entry);
   }
   EXPECT_THROW(static_cast<void>(find_entry("gremlin")), InvalidArgument);
+}
+
+TEST(Logger, LosesItsShareInItsBurstsAndKeepsTheRest) {
+  constexpr std::size_t rows = 200000;
+  constexpr double period = 0.01;
+  LogTable log;
+  log.names = {"omega_r", "omega_l", "tau_r"};
+  log.columns.assign(3, {});
+  for (std::size_t k = 0; k < rows; ++k) {
+    log.t.push_back(period * static_cast<double>(k));
+    for (std::vector<double>& column : log.columns) {
+      column.push_back(static_cast<double>(k));
+    }
+  }
+  const LogTable written = write_down({0.2, 0.02, 4.0, 3}, log, period, Random(1, 2, 3));
+  EXPECT_NEAR(1.0 - static_cast<double>(written.rows()) / rows, 0.02, 0.002);
+  std::size_t bursts = 0;
+  double jitter = 0.0;
+  for (std::size_t k = 1; k < written.rows(); ++k) {
+    const double row = written.columns[2][k];
+    bursts += row > written.columns[2][k - 1] + 1.5 ? 1 : 0;
+    jitter = std::max(jitter, std::abs(written.t[k] - period * row));
+    ASSERT_GT(written.t[k], written.t[k - 1]);
+    // The mean of a straight line over three rows is a row late.
+    ASSERT_NEAR(written.columns[0][k], std::max(row - 1.0, 0.5 * row), 1e-6);
+  }
+  EXPECT_NEAR(static_cast<double>(rows - written.rows()) / static_cast<double>(bursts), 4.0, 0.4);
+  EXPECT_NEAR(jitter, 0.2 * period, 0.01 * period);
+
+  const LogTable same = write_down({}, log, period, Random(1, 2, 3));
+  EXPECT_EQ(same.columns, log.columns);
+  EXPECT_EQ(same.rows(), log.rows());
+}
+
+TEST(Case, AnOrdinaryLogChangesNothingButTheLog) {
+  Request request;
+  request.seed = 9;
+  request.duration = 50.0;
+  request.kind = Kind::triple;
+  const Case plain = make_case(request, 1);
+  request.ordinary = true;
+  const Case ordinary = make_case(request, 1);
+  ASSERT_EQ(plain.causes.size(), 3U);
+  std::vector<std::string_view> names;
+  for (std::size_t k = 0; k < 3; ++k) {
+    names.push_back(plain.causes[k].of.entry->name);
+    EXPECT_EQ(plain.causes[k].parameters, ordinary.causes[k].parameters);
+  }
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(std::unique(names.begin(), names.end()), names.end()) << "three different ones";
+  EXPECT_EQ(plain.gap.after, ordinary.gap.after);
+  EXPECT_LT(ordinary.real.rows(), plain.real.rows());
+  EXPECT_GT(static_cast<double>(ordinary.real.rows()), 0.95 * static_cast<double>(plain.real.rows()));
 }
 
 TEST(Case, OneSeedOneCase) {
