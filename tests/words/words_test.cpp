@@ -251,6 +251,10 @@ TEST(IncidentSentence, TellsTheLikeliestCourse) {
                     HasSubstr("; less likely, not excluded: " + faults[3].sentence)));
   incident.candidates[0].left = 0.9;
   EXPECT_THAT(incident_sentence(incident), testing::StartsWith("no fault of the catalogue fits this well"));
+  incident.candidates[0].left = 1.0;
+  EXPECT_THAT(incident_sentence(incident),
+              AllOf(testing::StartsWith("no fault of the catalogue fits this: another load or ground"),
+                    HasSubstr("; 3 faults of the catalogue are not excluded"), Not(HasSubstr("best fit"))));
 }
 
 // Sizes over time stand beside the candidate, and faults that only growing explains are named.
