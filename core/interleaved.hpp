@@ -19,13 +19,13 @@ struct InterleavedRows {
 ///
 /// Rows that repeat the one before count as one. A column tells a row apart where its number lies outside of the
 /// interval between its two neighbours by more than 5 times the neighbours' distance and a fiftieth of the column's
-/// range: a signal that is sampled faster than it changes never does, noise does so rarely. A row stands apart where at
-/// least half of the columns that change tell, and one of them takes more than 50 values, told apart to a 500th of its
-/// range, that is not seen at the row's own number otherwise (so that speeds of a coarse encoder that fall to 0 and rise
-/// again are none). A second source has at least 5 such rows, and one row of 500: of one constant content; or, in at
-/// least half of the columns with more than 50 values, two tracks that alternate row by row, or rows that follow each
-/// other more closely than they lie to their neighbours and lie ten times as far off as noise bends the others. Single
-/// corrupted rows are none.
+/// range: a signal that is sampled faster than it changes never does, noise does so rarely. A row stands apart where
+/// at least half of the columns that change tell, and one of them takes more than 50 values, told apart to a 500th of
+/// its range, that is not seen at the row's own number otherwise (so that speeds of a coarse encoder that fall to 0
+/// and rise again are none). A second source has at least 5 such rows, and one row of 500: of one constant content;
+/// or, in at least half of the columns with more than 50 values, two tracks that alternate row by row, or rows that
+/// follow each other more closely than they lie to their neighbours and lie ten times as far off as noise bends the
+/// others. Single corrupted rows are none.
 [[nodiscard]] InterleavedRows interleaved_rows(const std::vector<const std::vector<double>*>& columns);
 
 }  // namespace wheelwright::core

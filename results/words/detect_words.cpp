@@ -210,10 +210,11 @@ std::string incident_sentence(const detector::Incident& incident) {
                                                          "this: several faults, or one that grows";
     text += fmt::format(", since {:.2f} s", incident.start);
   } else if (incident.candidates.front().left.value_or(0.0) > kFitsNot) {
-    text = fmt::format("no fault of the catalogue fits this: another load or ground (compare with the log that the "
-                       "model was learnt on by `wheelwright gap`), several faults, or one that it lacks; {} of the "
-                       "catalogue {} not excluded",
-                       plural(faults.size(), "fault"), faults.size() == 1 ? "is" : "are");
+    text = fmt::format(
+        "no fault of the catalogue fits this: another load or ground (compare with the log that the "
+        "model was learnt on by `wheelwright gap`), several faults, or one that it lacks; {} of the "
+        "catalogue {} not excluded",
+        plural(faults.size(), "fault"), faults.size() == 1 ? "is" : "are");
   } else {
     const detector::IncidentCandidate& first = incident.candidates.front();
     const bool told = first.left || first.course != detector::CourseClass::step;
