@@ -2,12 +2,14 @@
 #include "commission/constant_thresholds.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 #include <Eigen/QR>
 
+#include "commission/validation.hpp"
 #include "core/check.hpp"
 #include "detector/online_model.hpp"
 #include "model/filter/row_stream.hpp"
@@ -16,7 +18,6 @@ namespace wheelwright::commission {
 namespace {
 
 constexpr std::size_t kFewestBlocks = 10;
-constexpr std::size_t kFolds = 10, kHoldOutEvery = 3;  // as a trial on held-out driving (FoldOptions)
 
 // Σ YᵀY, Σ Yᵀε and Σ ε² of one output over the rows of a block, ε at θ̂.
 struct Moments {
@@ -146,28 +147,32 @@ class BlockFits {
   std::vector<Moments> blocks_;
 };
 
-// Largest |ε| of each block (rows) in each output (columns), ε of a block by the fit `fits[block]`.
-Eigen::MatrixXd block_maxima(core::RegressionSource& rows, const Blocks& blocks,
-                             const std::vector<Eigen::VectorXd>& fits) {
+// Largest |ε| of each block (rows) in each output (columns), ε of a block by its fit of each set of fits.
+std::array<Eigen::MatrixXd, 2> block_maxima(core::RegressionSource& rows, const Blocks& blocks,
+                                            const std::array<std::vector<Eigen::VectorXd>, 2>& fits) {
   const std::size_t n = rows.outputs();
-  Eigen::MatrixXd largest =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(blocks.count()), static_cast<Eigen::Index>(n));
+  std::array<Eigen::MatrixXd, 2> largest;
+  largest.fill(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(blocks.count()), static_cast<Eigen::Index>(n)));
   std::size_t instants = 0;
   core::for_each_block(rows, [&](const RegressionBlock& block) {
     for (std::size_t k = 0; k < block.t.size(); ++k, ++instants) {
       const std::size_t at = instants / blocks.length;
       for (std::size_t i = 0; at < blocks.count() && i < n; ++i) {
         const auto row = static_cast<Eigen::Index>(k * n + i);
-        double& most = largest(static_cast<Eigen::Index>(at), static_cast<Eigen::Index>(i));
-        most = std::max(most, std::abs(block.y[row] - block.Y.row(row).dot(fits[at])));
+        for (std::size_t set = 0; set < fits.size(); ++set) {
+          double& most = largest[set](static_cast<Eigen::Index>(at), static_cast<Eigen::Index>(i));
+          most = std::max(most, std::abs(block.y[row] - block.Y.row(row).dot(fits[set][at])));
+        }
       }
     }
   });
   return largest;
 }
 
+// As a trial on held-out driving has it.
 bool held_out(std::size_t block, std::size_t blocks) {
-  return block * kFolds / blocks % kHoldOutEvery == kHoldOutEvery - 1;
+  constexpr FoldOptions kFolds;
+  return block * kFolds.blocks / blocks % kFolds.hold_out_every == kFolds.hold_out_every - 1;
 }
 
 // That `exceeded` or more of `held_out` blocks exceed the largest of `learning` ones, all of which can be exchanged.
@@ -221,13 +226,13 @@ std::optional<detector::ConstantThresholds> constant_thresholds(core::Regression
   result.blocks = blocks.count();
   const auto learning = [&](std::size_t k) { return !held_out(k, blocks.count()); };
   const BlockFits fits(blocks, estimate);
-  std::vector<Eigen::VectorXd> of_all, of_learning;
+  std::array<std::vector<Eigen::VectorXd>, 2> of_blocks;  // of all, of those that are not held out
   for (std::size_t k = 0; k < blocks.count(); ++k) {
-    of_all.push_back(fits.without(k, [](std::size_t) { return true; }));
-    of_learning.push_back(fits.without(k, learning));
+    of_blocks[0].push_back(fits.without(k, [](std::size_t) { return true; }));
+    of_blocks[1].push_back(fits.without(k, learning));
     result.learning += learning(k) ? 1 : 0;
   }
-  const Eigen::MatrixXd largest = block_maxima(rows, blocks, of_all), tried = block_maxima(rows, blocks, of_learning);
+  const auto [largest, tried] = block_maxima(rows, blocks, of_blocks);
   for (std::size_t i = 0; i < n; ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     detector::ConstantThreshold& output = result.outputs[i];

@@ -32,21 +32,6 @@ constexpr int kReweighted = 4;       // times
 constexpr int kSweeps = 3000;        // of coordinates
 constexpr double kRidge = 1e-6;      // of the largest diagonal entry
 
-// Up to `most` settled instants of the window, half of them within some seconds of its beginning.
-std::vector<std::size_t> instants_of(const ReferenceMotion& motion, const Interval& window, std::size_t most) {
-  std::vector<std::size_t> all, out;
-  for (std::size_t k = 0; k < motion.instants(); ++k) {
-    if (motion.settled[k] && window.contains(motion.t[k])) {
-      all.push_back(k);
-    }
-  }
-  const std::size_t count = std::min(most, all.size());
-  for (std::size_t k = 0; k < count; ++k) {
-    out.push_back(all[count > 1 ? k * (all.size() - 1) / (count - 1) : 0]);
-  }
-  return out;
-}
-
 // ε and the scales of the rows.
 void take_residual(const ReferenceMotion& motion, const std::vector<std::size_t>& instants,
                    const Eigen::VectorXd& estimate, const bounds::Polytope& set, CourseRows& out) {
@@ -72,11 +57,9 @@ void take_residual(const ReferenceMotion& motion, const std::vector<std::size_t>
   }
 }
 
-// The fault as one of motion whose amount is of one sign, without a profile.
-FaultType as_step(const FaultType& fault) {
-  FaultType step = fault;
-  step.profile = {};
-  return fault.seen.size() > 0 ? as_motion_of_reading(step) : step;
+FaultType without_profile(FaultType fault) {
+  fault.profile = {};
+  return fault;
 }
 
 bool has_known_course(const FaultType& fault) {
@@ -413,17 +396,17 @@ CourseRows course_rows(const ReferenceMotion& motion, const filter::RegressorFil
                        const Eigen::VectorXd& estimate, const bounds::Polytope& set,
                        const std::vector<FaultType>& faults, const Interval& window, const CourseGrid& grid,
                        std::size_t most, std::size_t threads) {
-  const std::vector<std::size_t> instants = instants_of(motion, window, most);
+  const std::vector<std::size_t> instants = settled_within(motion, window, most);
   CourseRows out;
   take_residual(motion, instants, estimate, set, out);
   out.independent = std::max(1.0, window.width() * filter.design().beta / kApart);
   out.responses.resize(faults.size());
   core::for_all(faults.size(), threads, [&](std::size_t k) {
-    const FaultType step = has_known_course(faults[k]) ? as_step(faults[k]) : faults[k];
-    FaultType asked = faults[k];
-    asked.profile = {};
-    if (has_known_course(faults[k]) && (faults[k].whole || OnsetRows::knows(asked, filter.model()))) {
-      out.responses[k] = torque_responses(step, motion, filter, estimate, instants, grid.times);
+    const FaultType step = without_profile(faults[k]);
+    if (has_known_course(faults[k]) && (step.whole || OnsetRows::knows(step, filter.model()))) {
+      // An encoder's as one of motion, whose amount is of one sign.
+      out.responses[k] = torque_responses(step.seen.size() > 0 ? as_motion_of_reading(step) : step, motion, filter,
+                                          estimate, instants, grid.times);
     }
   });
   return out;
@@ -434,7 +417,7 @@ CourseRows course_rows_by_odometry(const OdometryReference& reference, const Mod
                                    double length, const Eigen::VectorXd& estimate, const bounds::Polytope& set,
                                    const std::vector<FaultType>& faults, const Interval& window, const CourseGrid& grid,
                                    std::size_t most) {
-  const std::vector<std::size_t> instants = instants_of(reference.motion, window, most);
+  const std::vector<std::size_t> instants = settled_within(reference.motion, window, most);
   CourseRows out;
   out.ways = true;
   take_residual(reference.motion, instants, estimate, set, out);
@@ -442,15 +425,13 @@ CourseRows course_rows_by_odometry(const OdometryReference& reference, const Mod
   std::vector<double> times{reference.motion.t.empty() ? 0.0 : reference.motion.t.front()};
   times.insert(times.end(), grid.times.begin(), grid.times.end());
   for (const FaultType& fault : faults) {
-    FaultType step = fault;
-    step.profile = {};
     if (!has_known_course(fault)) {
       out.responses.emplace_back();
     } else if (!shows_in_odometry(fault)) {
       out.responses.emplace_back(Eigen::MatrixXd::Zero(out.residual.size(), static_cast<Eigen::Index>(times.size())));
     } else {
       out.responses.push_back(
-          odometry_responses(reference, model, measurement, errors, step, estimate, instants, times));
+          odometry_responses(reference, model, measurement, errors, without_profile(fault), estimate, instants, times));
     }
   }
   return out;

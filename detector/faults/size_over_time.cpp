@@ -86,16 +86,8 @@ void take_sides(const FaultType& fault, SizeEvidence& out) {
 // Up to `most` instants in the window at which a row is, evenly spread, and those next to the times `also`.
 std::vector<std::size_t> rows_within(const ReferenceMotion& motion, const Interval& window, std::size_t most,
                                      const std::vector<double>& also) {
-  std::vector<std::size_t> all, out;
-  for (std::size_t k = 0; k < motion.instants(); ++k) {
-    if (motion.settled[k] && window.contains(motion.t[k])) {
-      all.push_back(k);
-    }
-  }
-  const std::size_t count = std::min(most, all.size());
-  for (std::size_t k = 0; k < count; ++k) {
-    out.push_back(all[count > 1 ? k * (all.size() - 1) / (count - 1) : 0]);
-  }
+  const std::vector<std::size_t> all = settled_within(motion, window, motion.instants());
+  std::vector<std::size_t> out = settled_within(motion, window, most);
   for (const double t : also) {
     const auto at = std::ranges::lower_bound(all, t, {}, [&](std::size_t k) { return motion.t[k]; });
     if (at != all.end() && window.contains(t)) {

@@ -15,6 +15,20 @@ constexpr double kForgottenAfter = 20.0;  // 1/β
 
 }  // namespace
 
+std::vector<std::size_t> settled_within(const ReferenceMotion& motion, const Interval& window, std::size_t most) {
+  std::vector<std::size_t> all, out;
+  for (std::size_t k = 0; k < motion.instants(); ++k) {
+    if (motion.settled[k] && window.contains(motion.t[k])) {
+      all.push_back(k);
+    }
+  }
+  const std::size_t count = std::min(most, all.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    out.push_back(all[count > 1 ? k * (all.size() - 1) / (count - 1) : 0]);
+  }
+  return out;
+}
+
 RowWeights::RowWeights(const ReferenceMotion& motion, const FilterDesign& design)
     : motion_(motion), design_(design), kernel_(design, motion.kind, motion.nominal_step) {
   if (!motion.cuts.empty()) {

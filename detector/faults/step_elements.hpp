@@ -7,11 +7,16 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/interval.hpp"
 #include "detector/faults/reference_motion.hpp"
 #include "model/fault_type.hpp"
 #include "model/filter/kernel.hpp"
 
 namespace wheelwright::detector {
+
+/// Up to `most` instants of `motion` in the window (s) at which a row is settled, evenly spread over all of them.
+[[nodiscard]] std::vector<std::size_t> settled_within(const ReferenceMotion& motion, const Interval& window,
+                                                      std::size_t most);
 
 /// Weights of the elements of a motion in its rows, one row after the other.
 class RowWeights {
